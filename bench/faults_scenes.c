@@ -709,6 +709,12 @@ static void feedback_hand(double t, double x[3], double v[3])
     .item = 2, .name = (text), .build = sheet_build, .motion = FINGERTIP(deep_hand),              \
     .seconds = 0.8, .check = {.kind = FAULTS_HOLD, .bound = 0.02, .model = (with)}, .size = 0.001 \
   }
+#define SHEET_TOOL(text, make, h, thick)                                              \
+  {                                                                                   \
+    .item = 2, .name = (text), .build = (make),                                       \
+    .motion = {.hand = (h), .radius = 0.005, .stiffness = 1000.0, .cube_tool = true}, \
+    .seconds = 0.8, .check = HELD, .size = (thick)                                    \
+  }
 #define SHEET_HIT(text, thick, h)                                                            \
   {                                                                                          \
     .item = 2, .name = (text), .build = sheet_build, .motion = FINGERTIP(h), .seconds = 0.3, \
@@ -761,13 +767,11 @@ const faults_scene faults_table[] = {
     SHEET_THROUGH("sheet_proxy", "proxy"),
     SHEET_THROUGH("sheet_god", "god-object"),
     SHEET_THROUGH("sheet_virtual", "virtual"),
-    {.item = 2,
-     .name = "sheet_tool",
-     .build = sheet_build,
-     .motion = {.hand = deep_hand, .radius = 0.005, .stiffness = 1000.0, .cube_tool = true},
-     .seconds = 0.8,
-     .check = HELD,
-     .size = 0.001},
+    SHEET_TOOL("sheet_tool", sheet_build, deep_hand, 1e-3),
+    SHEET_TOOL("sheet_tool_3mm", sheet_build, deep_hand, 3e-3),
+    SHEET_TOOL("sheet_tool_20mm", sheet_build, deep_hand, 2e-2),
+    SHEET_TOOL("foil_tool_2", sheet_build, hit_hand_fast, 1e-4),
+    SHEET_TOOL("flying_tool", flying_build, flying_hand, 1e-3),
     SHEET_HIT("sheet_hit_0.5", 1e-3, hit_hand_slow),
     SHEET_HIT("sheet_hit_2", 1e-3, hit_hand_fast),
     SHEET_HIT("foil_hit_2", 1e-4, hit_hand_fast),
@@ -838,6 +842,34 @@ const faults_scene faults_table[] = {
      .build = seam_build,
      .motion = {.hand = seam_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
      .seconds = 1.0,
+     .check = WITHIN(0.02)},
+    {.item = 3,
+     .name = "seam_tool_rub",
+     .build = seam_build,
+     .motion = {.hand = seam_hand,
+                .radius = 0.01,
+                .stiffness = 1000.0,
+                .friction = 0.5,
+                .cube_tool = true},
+     .seconds = 1.0,
+     .check = WITHIN(0.02)},
+    {.item = 3,
+     .name = "seam_tool_body",
+     .build = seam_body_build,
+     .motion = {.hand = seam_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
+     .seconds = 1.0,
+     .check = WITHIN(0.02)},
+    {.item = 3,
+     .name = "seam_tool_pair",
+     .build = seam_pair_build,
+     .motion = {.hand = seam_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
+     .seconds = 1.0,
+     .check = WITHIN(0.02)},
+    {.item = 3,
+     .name = "nook_tool",
+     .build = nook_build,
+     .motion = {.hand = nook_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
+     .seconds = 0.7,
      .check = WITHIN(0.02)},
     {.item = 3,
      .name = "nook",

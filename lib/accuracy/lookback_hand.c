@@ -311,6 +311,19 @@ static void model_add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t 
   hapi_v3_copy(out->point_body, t->point_body);
 }
 
+/* The side that the reference's hand touches. */
+static const hapi_tool_side *tool_side(const hapi_tick *tick, const hapi_lookback_touch *t)
+{
+  const hapi_tool_world *tools = &tick->touches.tool;
+  for (uint32_t i = 0; i < tools->pair_count; ++i) {
+    const hapi_tool_pair *pair = &tools->pairs[i];
+    if (pair->key == t->key && pair->pointer == t->pointer && pair->sided) {
+      return &pair->side;
+    }
+  }
+  return NULL;
+}
+
 /* False: there are more points than the loop has room for. */
 static bool model_add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
                            const hapi_state_pointer *p, double period)
@@ -326,7 +339,8 @@ static bool model_add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t bo
                            .hull = &hand->tick->pointers.hulls[t->pointer],
                            .key = t->key,
                            .reach = hapi_neighbors_reach(speed, period),
-                           .horizon = period};
+                           .horizon = period,
+                           .side = tool_side(hand->tick, t)};
   uint32_t count = hapi_tool_points(w->near, &at, hand->found);
   if (m->tool_count + count > hand->tick->capacity.tool_points) {
     return false;
@@ -441,8 +455,8 @@ static void hand_resume(hapi_lookback *w)
   for (uint32_t i = 0; i < t->touches.tool.pair_count; ++i) {
     ramp_resume(&t->touches.tool.pairs[i].ramp, &t->touches.tool.pairs[i].seen);
   }
-  hapi_tool_place(&t->touches, &t->pointers, &t->bodies,
-                  t->facts.period); /* says where the points of hulls are */
+  /* Says where the points of hulls are. */
+  hapi_tool_place(&t->touches, &t->pointers, &t->bodies, &t->facts);
   for (uint32_t i = 0; i < t->touches.count; ++i) {
     hapi_local_contact *c = &t->touches.of[i];
     const hapi_state_spring *spring = c->rubs ? hand_find_spring(w, c) : NULL;
@@ -462,6 +476,7 @@ bool hapi_lookback_feel(hapi_lookback *w, uint32_t wishes, const hapi_lookback_m
   m->body_count = m->contact_count = m->tool_count = 0;
   m->wishes = hapi_wish_set(wishes, HAP_EFFECT_OBSERVER, HAP_EFFECT_OFF);
   ++m->number;
+  m->tick = t->facts.tick;
   hand_take_pointers(t, at);
   if (!hand_all_are_told(&w->hand)) {
     hand_tell(&w->hand);

@@ -12,6 +12,8 @@
 #include "base/thread.h"
 #include "base/vec.h"
 #include "sync/mesh_filter.h"
+#include "sync/tool_seams.h"
+#include "sync/tool_side.h"
 #include "sync/touch_local.h"
 
 /* One pass: pairs and poses in, contacts out, each with what the tick needs to place it anew. Then
@@ -23,6 +25,7 @@
 #define AGE_TICKS 2.0 /* from the poses of a pass to the use of its contacts */
 #define LINGER_PASSES 20u
 #define LIMIT_STEPS 40   /* halvings: a metre to a picometre */
+#define TOOL_ROOM 2u     /* points of hulls in a pass: those found anew at seams count twice */
 #define CONTACT_HZ 200.0 /* until the first message says more */
 
 /* Where a body of the pass is. By slot. */
@@ -40,12 +43,24 @@ typedef struct pass_pair {
   bool left_out;  /* for want of room */
 } pass_pair;
 
+typedef struct tool_geom tool_geom;
+
+/* What a pass finds for the hulls. */
+typedef struct tool_memory {
+  tool_geom *geoms; /* capacity.tool_points, as the parts */
+  hapi_tool_part *parts;
+  hapi_tool_point *points; /* TOOL_ROOM times that, as the marks */
+  hapi_tool_mark *marks;
+  uint32_t count;
+} tool_memory;
+
 struct hapi_contact {
   hapi_contact_config config;
   hapi_near *near; /* newest one that the loop is ready for; NULL: none yet */
   hapi_poses *poses;
   pass_body *bodies; /* capacity.bodies */
   pass_pair *pairs;  /* capacity.contacts */
+  tool_memory tools;
   uint64_t number;
   uint32_t lingers;          /* passes that are made although nothing is left to find */
   _Atomic uint64_t left_out; /* pairs without room for their contacts, sum over the passes */
@@ -313,22 +328,30 @@ static bool point_counts(const placed_geom *geom, hapi_patch_point *io)
   return hapi_mesh_allows(geom->in->open_edges, corners, io->normal);
 }
 
+static hapi_touch_side tool_side_at(const placed_tool *tool, const hap_pose *pose)
+{
+  return (hapi_touch_side){.body = pose,
+                           .pose = *pose,
+                           .shape = {.kind = HAPI_SHAPE_HULL,
+                                     .rounding = tool->in->radius,
+                                     .hull = &tool->in->hull.points[0][0],
+                                     .hull_count = tool->in->hull.count},
+                           .shape_pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
+}
+
+/* The points where the hull would touch if it were there, away from where it is. */
 static void tool_pair_add(const hapi_contact *contact, const placed_tool *tool,
-                          const hapi_near_tool_pair *pair, tool_group *io)
+                          const hapi_near_tool_pair *pair, const double away[3], tool_group *io)
 {
   placed_geom geom;
   hapi_patch patch;
+  hap_pose pose = tool->pose;
+  hapi_v3_add(pose.position, away, pose.position);
   if (!geom_place(contact, pair->geom, &geom)) {
     return;
   }
   const mover self = {&tool->twist, tool->in->extent};
-  const hapi_touch_side a = {.body = &tool->pose,
-                             .pose = tool->pose,
-                             .shape = {.kind = HAPI_SHAPE_HULL,
-                                       .rounding = tool->in->radius,
-                                       .hull = &tool->in->hull.points[0][0],
-                                       .hull_count = tool->in->hull.count},
-                             .shape_pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
+  const hapi_touch_side a = tool_side_at(tool, &pose);
   const hapi_touch_side b = geom_side(&geom);
   if (!hapi_tool_patch(&a, &b, margin_between(contact, self, geom_mover(&geom)), tool->in->extent,
                        &patch)) {
@@ -352,46 +375,236 @@ static void tool_pair_add(const hapi_contact *contact, const placed_tool *tool,
     out->at.generation_b = geom.in->generation;
     hapi_v3_copy(out->at.core_a, io->spots.places[at]);
     hapi_v3_copy(patch.points[i].normal, io->spots.normals[at]);
-    io->spots.gaps[at] = patch.points[i].gap;
+    hapi_touch_on_shape(&b, &patch.points[i], io->spots.on_geom[at]);
+    io->spots.gaps[at] = patch.points[i].gap - hapi_v3_dot(patch.points[i].normal, away);
   }
   ++io->pairs;
 }
 
-/* Nearest first is the order of the pairs: what finds no room is the farthest. */
-static void take_group(hapi_contact *contact, const tool_group *in, hapi_patches *out)
+/* The pairs of one key, which follow each other. */
+struct tool_geom {
+  placed_tool tool;
+  const hapi_near_tool_pair *pairs;
+  uint32_t count;
+};
+
+/* For calls back. */
+typedef struct tool_pass {
+  hapi_contact *contact;
+  const tool_geom *geom;
+} tool_pass;
+
+static void tool_geom_find(const hapi_contact *contact, const tool_geom *g, const double away[3],
+                           tool_group *out)
 {
+  out->spots.count = out->pairs = 0;
+  for (uint32_t i = 0; i < g->count; ++i) {
+    tool_pair_add(contact, &g->tool, &g->pairs[i], away, out);
+  }
+}
+
+/* m: a shape of that extent is not nearer to the geom than this. */
+static double least_distance(const placed_geom *geom, const hapi_touch_side *from, double extent)
+{
+  const hapi_shape *s = &geom->shape;
+  double middle[3] = {0.0, 0.0, 0.0}; /* in the geom's frame */
+  double reach = hapi_v3_norm(s->half) + s->radius;
+  if (s->kind == HAPI_SHAPE_PLANE) {
+    return -HUGE_VAL;
+  }
+  if (s->kind == HAPI_SHAPE_HULL) {
+    double side[3];
+    hapi_v3_copy(s->hull, middle);
+    for (size_t i = 1; i < s->hull_count; ++i) {
+      hapi_v3_sub(s->hull + 3 * i, s->hull, side);
+      reach = fmax(reach, hapi_v3_norm(side));
+    }
+  }
+  hapi_pose_point(geom->pose.position, geom->pose.quat_wxyz, middle, middle);
+  hapi_v3_sub(middle, from->pose.position, middle);
+  return hapi_v3_norm(middle) - extent - reach;
+}
+
+/* From a shape of that extent; false: it is not nearer than *io_distance. */
+static bool tool_geom_distance(const hapi_contact *contact, const tool_geom *g,
+                               const hapi_touch_side *from, double extent, double *io_distance,
+                               double out_normal[3])
+{
+  bool found = false;
+  for (uint32_t i = 0; i < g->count; ++i) {
+    placed_geom geom;
+    double distance;
+    double normal[3];
+    if (geom_place(contact, g->pairs[i].geom, &geom) &&
+        least_distance(&geom, from, extent) < *io_distance &&
+        hapi_patch_distance(&from->shape, &from->pose, &geom.shape, &geom.pose, &distance,
+                            normal) &&
+        distance < *io_distance) {
+      found = true;
+      *io_distance = distance;
+      hapi_v3_copy(normal, out_normal);
+    }
+  }
+  return found;
+}
+
+/* As hapi_tool_distance. */
+static bool tool_pass_distance(void *of, const hap_pose *hull, double *out_distance,
+                               double out_normal[3])
+{
+  const tool_pass *pass = of;
+  const placed_tool *tool = &pass->geom->tool;
+  const hapi_touch_side a = tool_side_at(tool, hull);
+  *out_distance = HUGE_VAL;
+  return tool_geom_distance(pass->contact, pass->geom, &a, tool->in->extent, out_distance,
+                            out_normal);
+}
+
+/* Where the hull is deep in the geom, or behind it, the points of the side that it touches. */
+static void tool_geom_keep_side(hapi_contact *contact, const tool_geom *g, tool_group *io)
+{
+  placed_geom geom;
+  double away[3];
+  tool_pass pass = {contact, g};
+  const hapi_tool_side *told =
+      hapi_tool_side_find(hapi_poses_sides(contact->poses), contact->poses->side_count,
+                          g->pairs->key, g->tool.in->pointer);
+  if (told == NULL || !geom_place(contact, g->pairs->geom, &geom)) {
+    return;
+  }
+  const hapi_tool_seek seek = {.told = told,
+                               .body = geom.body != NULL ? &geom.body->pose : NULL,
+                               .hull = &g->tool.pose,
+                               .extent = g->tool.in->extent,
+                               .distance = tool_pass_distance,
+                               .geom = &pass};
+  if (hapi_tool_side_seek(&seek, &io->spots, away)) {
+    tool_geom_find(contact, g, away, io);
+  }
+}
+
+/* Nearest first is the order of the pairs: what finds no room is the farthest. */
+static void part_take(hapi_contact *contact, uint32_t part, const tool_group *in)
+{
+  tool_memory *m = &contact->tools;
   uint32_t kept[HAPI_TOOL_PAIR_POINTS];
   uint32_t count = in->spots.count;
   if (in->pairs > 1) {
     count = hapi_tool_reduce(&in->spots, kept);
   }
-  if (out->tool_count + count > contact->config.capacity.tool_points) {
+  m->parts[part].first = m->count;
+  m->parts[part].count = 0;
+  if (m->count + count > TOOL_ROOM * contact->config.capacity.tool_points) {
     atomic_fetch_add_explicit(&contact->left_out, 1, memory_order_relaxed);
     return;
   }
   for (uint32_t i = 0; i < count; ++i) {
     uint32_t from = in->pairs > 1 ? kept[i] : i;
-    hapi_patches_tools(out)[out->tool_count++] = in->points[from];
+    hapi_tool_mark *mark = &m->marks[m->count];
+    m->points[m->count++] = in->points[from];
+    *mark = (hapi_tool_mark){.gap = in->spots.gaps[from],
+                             .border = in->points[from].at.slide != HAPI_SLIDE_NONE};
+    hapi_v3_copy(in->spots.on_geom[from], mark->at);
+    hapi_v3_copy(in->spots.places[from], mark->place);
+    hapi_v3_copy(in->spots.normals[from], mark->normal);
+  }
+  m->parts[part].count = count;
+}
+
+/* ---- where geoms adjoin, as tool_seams.h asks ---- */
+
+static bool part_holds(void *of, uint32_t part, const double point[3], double within)
+{
+  const hapi_contact *contact = of;
+  double normal[3];
+  hapi_touch_side ball = {.pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}},
+                          .shape = {.kind = HAPI_SHAPE_SPHERE}};
+  hapi_v3_copy(point, ball.pose.position);
+  return tool_geom_distance(contact, &contact->tools.geoms[part], &ball, 0.0, &within, normal);
+}
+
+static double part_depth(void *of, uint32_t part, const double away[3])
+{
+  const hapi_contact *contact = of;
+  const tool_geom *g = &contact->tools.geoms[part];
+  double distance = HUGE_VAL;
+  double normal[3];
+  hap_pose pose = g->tool.pose;
+  hapi_v3_add(pose.position, away, pose.position);
+  const hapi_touch_side a = tool_side_at(&g->tool, &pose);
+  bool found = tool_geom_distance(contact, g, &a, g->tool.in->extent, &distance, normal);
+  return found ? -distance : -HUGE_VAL;
+}
+
+static void part_look(void *of, uint32_t part, const double away[3])
+{
+  hapi_contact *contact = of;
+  tool_group found;
+  tool_geom_find(contact, &contact->tools.geoms[part], away, &found);
+  part_take(contact, part, &found);
+}
+
+/* Those that are left, in the order of the parts. */
+static void parts_fill(hapi_contact *contact, uint32_t count, hapi_patches *out)
+{
+  const tool_memory *m = &contact->tools;
+  out->tool_count = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    const hapi_tool_part *part = &m->parts[i];
+    if (out->tool_count + part->count > contact->config.capacity.tool_points) {
+      atomic_fetch_add_explicit(&contact->left_out, 1, memory_order_relaxed);
+      continue;
+    }
+    for (uint32_t k = part->first; k < part->first + part->count; ++k) {
+      if (!m->marks[k].dropped) {
+        hapi_tool_point *point = &hapi_patches_tools(out)[out->tool_count++];
+        *point = m->points[k];
+        point->group = part->group;
+      }
+    }
   }
 }
 
 static void tools_fill(hapi_contact *contact, hapi_patches *out)
 {
+  static const double here[3] = {0.0, 0.0, 0.0};
   const hapi_near_tool_pair *pairs = hapi_near_tool_pairs(contact->near);
+  tool_memory *m = &contact->tools;
+  uint32_t parts = 0;
   tool_group found;
-  out->tool_count = 0;
+  m->count = 0;
   for (uint32_t i = 0; i < contact->near->tool_pair_count;) {
     uint64_t key = pairs[i].key;
     const hapi_near_tool *in = &hapi_near_tools(contact->near)[pairs[i].tool];
     const hapi_poses_pointer *loop = &hapi_poses_pointers(contact->poses)[in->pointer];
     bool told = loop->generation == in->generation; /* the loop's pose; if it told none, physics' */
-    const placed_tool tool = {in, told ? loop->pose : in->pose, told ? loop->twist : in->twist};
-    found.spots.count = found.pairs = 0;
+    tool_geom geom = {.tool = {in, told ? loop->pose : in->pose, told ? loop->twist : in->twist},
+                      .pairs = &pairs[i]};
     for (; i < contact->near->tool_pair_count && pairs[i].key == key; ++i) {
-      tool_pair_add(contact, &tool, &pairs[i], &found);
+      ++geom.count;
     }
-    take_group(contact, &found, out);
+    tool_geom_find(contact, &geom, here, &found);
+    if (told) {
+      tool_geom_keep_side(contact, &geom, &found);
+    }
+    if (found.spots.count > 0 && parts < contact->config.capacity.tool_points) {
+      m->geoms[parts] = geom;
+      m->parts[parts] =
+          (hapi_tool_part){.key = key, .hull = geom.pairs->tool, .extent = in->extent};
+      part_take(contact, parts++, &found);
+    } else {
+      atomic_fetch_add_explicit(&contact->left_out, found.spots.count > 0, memory_order_relaxed);
+    }
   }
+  hapi_tool_seams seams = {.of = contact,
+                           .parts = m->parts,
+                           .count = parts,
+                           .marks = m->marks,
+                           .holds = part_holds,
+                           .depth = part_depth,
+                           .look = part_look};
+  hapi_tool_seams_join(&seams);
+  parts_fill(contact, parts, out);
 }
 
 /* ---- a pass ---- */
@@ -464,6 +677,7 @@ static void pass_make(hapi_contact *contact, int64_t valid_from_ns)
   bool found = out->contact_count + out->tool_count > 0;
   contact->lingers = found ? LINGER_PASSES : contact->lingers - (contact->lingers > 0);
   out->model_number = contact->near->model_number;
+  out->tick = contact->poses->tick;
   out->valid_from_ns = valid_from_ns;
   tape_follow(contact, out);
   hapi_exchange_patches_publish(contact->config.exchange);
@@ -501,7 +715,14 @@ hap_status hapi_contact_create(const hapi_contact_config *config, hapi_contact *
   contact->config = *config;
   contact->bodies = hapi_alloc_array(config->capacity.bodies, sizeof *contact->bodies);
   contact->pairs = hapi_alloc_array(config->capacity.contacts, sizeof *contact->pairs);
-  if (contact->bodies == NULL || contact->pairs == NULL) {
+  tool_memory *tools = &contact->tools;
+  const uint32_t most = config->capacity.tool_points;
+  tools->geoms = hapi_alloc_array(most, sizeof *tools->geoms);
+  tools->parts = hapi_alloc_array(most, sizeof *tools->parts);
+  tools->points = hapi_alloc_array((size_t)TOOL_ROOM * most, sizeof *tools->points);
+  tools->marks = hapi_alloc_array((size_t)TOOL_ROOM * most, sizeof *tools->marks);
+  if (contact->bodies == NULL || contact->pairs == NULL || tools->geoms == NULL ||
+      tools->parts == NULL || tools->points == NULL || tools->marks == NULL) {
     hapi_contact_destroy(contact);
     return HAP_ERROR_MEMORY;
   }
@@ -517,6 +738,10 @@ void hapi_contact_destroy(hapi_contact *contact)
   hapi_contact_stop_thread(contact);
   hapi_free(contact->bodies);
   hapi_free(contact->pairs);
+  hapi_free(contact->tools.geoms);
+  hapi_free(contact->tools.parts);
+  hapi_free(contact->tools.points);
+  hapi_free(contact->tools.marks);
   hapi_free(contact);
 }
 

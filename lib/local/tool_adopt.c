@@ -25,17 +25,85 @@ void hapi_tool_set_aside(hapi_touches *touches)
   /* w->count stays: how many are set aside, until they are taken or put back */
 }
 
-static uint32_t pair_of(hapi_tool_world *w, const hapi_tool_point *in)
+/* A pair of the same group goes on with what the others have: the surface is one. */
+static void pair_inherit(const hapi_tool_world *w, hapi_tool_pair *io)
+{
+  for (uint32_t i = 0; i < w->pair_count; ++i) {
+    const hapi_tool_pair *other = &w->pairs[i];
+    if (other->group == io->group && other->pointer == io->pointer && other->seen) {
+      io->ramp = other->ramp;
+      io->seen = true;
+      io->depth = other->depth;
+      return;
+    }
+  }
+}
+
+static uint32_t find_pair(const hapi_tool_world *w, const hapi_tool_point *in)
 {
   for (uint32_t i = 0; i < w->pair_count; ++i) {
     if (w->pairs[i].key == in->at.key && w->pairs[i].pointer == in->pointer) {
       return i;
     }
   }
+  return HAPI_SLOT_NONE;
+}
+
+static uint32_t pair_of(hapi_tool_world *w, const hapi_tool_point *in)
+{
+  uint32_t found = find_pair(w, in);
+  if (found != HAPI_SLOT_NONE) {
+    return found;
+  }
   HAPI_ASSERT_INDEX(w->pair_count, 3 * w->capacity);
-  w->pairs[w->pair_count] = (hapi_tool_pair){
-      .key = in->at.key, .pointer = in->pointer, .first = HAPI_SLOT_NONE, .depth = -HUGE_VAL};
+  w->pairs[w->pair_count] = (hapi_tool_pair){.key = in->at.key,
+                                             .pointer = in->pointer,
+                                             .first = HAPI_SLOT_NONE,
+                                             .group = in->group,
+                                             .was = in->group,
+                                             .renewed = true,
+                                             .depth = -HUGE_VAL};
+  pair_inherit(w, &w->pairs[w->pair_count]);
   return w->pair_count++;
+}
+
+/* The pairs that there are, before new ones come. */
+static void pair_regroup(hapi_tool_world *w, const hapi_tool_point *in)
+{
+  uint32_t found = find_pair(w, in);
+  if (found != HAPI_SLOT_NONE) {
+    w->pairs[found].group = in->group;
+    w->pairs[found].renewed = true;
+  }
+}
+
+/* Pairs all of whose points are leaving share with whom they shared. */
+static void regroup_leaving(hapi_tool_world *w)
+{
+  for (uint32_t i = 0; i < w->pair_count; ++i) {
+    for (uint32_t k = 0; k < w->pair_count && !w->pairs[i].renewed; ++k) {
+      const hapi_tool_pair *other = &w->pairs[k];
+      if (other->renewed && other->was == w->pairs[i].was &&
+          other->pointer == w->pairs[i].pointer) {
+        w->pairs[i].group = other->group;
+        break;
+      }
+    }
+  }
+}
+
+/* Those of a group, one after the other. */
+static void link_groups(hapi_tool_world *w)
+{
+  for (uint32_t i = 0; i < w->pair_count; ++i) {
+    w->pairs[i].ring = i;
+    for (uint32_t k = 0; k < i && w->pairs[i].ring == i; ++k) {
+      if (w->pairs[k].group == w->pairs[i].group && w->pairs[k].pointer == w->pairs[i].pointer) {
+        w->pairs[i].ring = w->pairs[k].ring;
+        w->pairs[k].ring = i;
+      }
+    }
+  }
 }
 
 /* Of those set aside the nearest that may go on as this one; HAPI_SLOT_NONE: none. */
@@ -114,6 +182,7 @@ static void tool_add(hapi_touches *touches, const hapi_tool_point *in, uint32_t 
   }
   tool->in = *in;
   tool->pair = pair;
+  w->pairs[pair].found = w->found;
   c->slot = HAPI_SLOT_NONE;
   c->body = in->at.body_b;
   c->pointer = in->pointer;
@@ -167,6 +236,8 @@ static uint32_t tools_begin(hapi_tool_world *w)
   w->count = 0;
   for (uint32_t i = 0; i < w->pair_count; ++i) {
     w->pairs[i].first = HAPI_SLOT_NONE;
+    w->pairs[i].was = w->pairs[i].group;
+    w->pairs[i].renewed = false;
   }
   for (uint32_t i = 0; i < old_count; ++i) {
     w->old_tools[i].heir = 0;
@@ -178,6 +249,8 @@ static void tools_end(hapi_touches *touches, uint32_t old_count, uint32_t wishes
 {
   tools_keep_leaving(touches, old_count, wishes);
   drop_pairs(&touches->tool);
+  regroup_leaving(&touches->tool);
+  link_groups(&touches->tool);
 }
 
 static bool is_there(const hapi_tool_world *w, const hapi_pointers *pointers,
@@ -208,8 +281,10 @@ void hapi_tool_adopt_model(hapi_touches *touches, const hapi_pointers *pointers,
     return;
   }
   uint32_t old_count = tools_begin(&touches->tool);
+  touches->tool.found = model->tick;
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     if (contacts[i].tool != 0) {
+      pair_regroup(&touches->tool, &tools[contacts[i].tool - 1]);
       choose_heirs(&touches->tool, old_count, &tools[contacts[i].tool - 1], i);
     }
   }
@@ -237,7 +312,9 @@ void hapi_tool_adopt_patches(hapi_touches *touches, const hapi_pointers *pointer
   }
   hapi_tool_set_aside(touches);
   uint32_t old_count = tools_begin(&touches->tool);
+  touches->tool.found = patches->tick;
   for (uint32_t i = 0; i < patches->tool_count; ++i) {
+    pair_regroup(&touches->tool, &tools[i]);
     choose_heirs(&touches->tool, old_count, &tools[i], i);
   }
   for (uint32_t i = 0; i < patches->tool_count; ++i) {

@@ -28,7 +28,7 @@ typedef struct surface_fit {
   double most;       /* m, the largest stretch */
 } surface_fit;
 
-/* A point of the pair that holds now, or did so at the last tick. */
+/* A point of the group that holds now, or did so at the last tick. */
 static bool point_holds(const hapi_touches *touches, uint64_t tick, const hapi_local_contact *c,
                         const double normal[3])
 {
@@ -82,10 +82,12 @@ static bool surface_find(const hapi_touches *touches, const hapi_bodies *bodies,
 {
   const hapi_tool_world *w = &touches->tool;
   const hapi_local_contact *contacts = hapi_touches_of_tools(touches);
-  uint32_t first = w->pairs[w->tools[contact->tool - 1].pair].first;
+  uint32_t pair = w->tools[contact->tool - 1].pair;
   double moment[2] = {0.0, 0.0};
   memset(out, 0, sizeof *out);
-  for (uint32_t k = first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+  hapi_tool_walk at = hapi_tool_walk_begin(w, pair);
+  for (; at.tool != HAPI_SLOT_NONE; hapi_tool_walk_next(w, &at)) {
+    uint32_t k = at.tool;
     if (point_holds(touches, tick, &contacts[k], normal)) {
       add_mean(&w->tools[k].friction, hapi_bodies_at(bodies, contacts[k].body), out);
     }
@@ -96,7 +98,8 @@ static bool surface_find(const hapi_touches *touches, const hapi_bodies *bodies,
   hapi_v3_scale(1.0 / out->weight, out->middle, out->middle);
   hapi_v3_scale(1.0 / out->weight, out->stretch, out->stretch);
   out->stretch[3] /= out->weight;
-  for (uint32_t k = first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+  for (at = hapi_tool_walk_begin(w, pair); at.tool != HAPI_SLOT_NONE; hapi_tool_walk_next(w, &at)) {
+    uint32_t k = at.tool;
     if (point_holds(touches, tick, &contacts[k], normal)) {
       add_moment(&w->tools[k].friction, hapi_bodies_at(bodies, contacts[k].body), out, normal,
                  moment);

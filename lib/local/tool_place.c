@@ -5,8 +5,10 @@
 #include <math.h>
 
 #include "base/assert.h"
+#include "base/pose.h"
 #include "local/contact_ramp.h"
 #include "local/touch_place.h"
+#include "sync/tool_side.h"
 
 /* Where the contacts of hulls are, and what part of the pointer's stiffness k each has
  * (docs/decisions/tools.md): together, those of a pair that push the same way have k, as a bed of
@@ -106,13 +108,15 @@ static double normal_likeness(const hapi_local_contact *a, const hapi_local_cont
   return u * u * (3.0 - 2.0 * u);
 }
 
-/* How much deeper than the point others of its pair are, by their distance: the largest of all. */
+/* How much deeper than the point others of its group are, by their distance: the largest of all. */
 static double slope_at(const hapi_tool_world *w, const hapi_local_contact *contacts, uint32_t index,
                        double near)
 {
   double steepest = 0.0;
   const hapi_local_tool *tool = &w->tools[index];
-  for (uint32_t k = w->pairs[tool->pair].first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+  hapi_tool_walk at = hapi_tool_walk_begin(w, tool->pair);
+  for (; at.tool != HAPI_SLOT_NONE; hapi_tool_walk_next(w, &at)) {
+    uint32_t k = at.tool;
     double deeper = w->tools[k].depth - tool->depth;
     double apart[3];
     if (!w->tools[k].placed || !(deeper > 0.0)) {
@@ -149,7 +153,9 @@ static void tool_weigh(const hapi_tool_world *w, hapi_local_contact *contacts, u
   const hapi_local_tool *tool = &w->tools[index];
   double sum = 0.0;
   double members = 0.0;
-  for (uint32_t k = w->pairs[tool->pair].first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+  hapi_tool_walk at = hapi_tool_walk_begin(w, tool->pair);
+  for (; at.tool != HAPI_SLOT_NONE; hapi_tool_walk_next(w, &at)) {
+    uint32_t k = at.tool;
     if (w->tools[k].placed) {
       double like = k == index ? 1.0 : normal_likeness(&contacts[k], &contacts[index]);
       sum += w->tools[k].claim * like;
@@ -160,22 +166,98 @@ static void tool_weigh(const hapi_tool_world *w, hapi_local_contact *contacts, u
   contacts[index].weight = sum > 0.0 ? all * tool->claim / sum : 0.0;
 }
 
-static void follow_pair(hapi_tool_world *w, hapi_tool_pair *pair, hapi_local_contact *contacts,
-                        const hapi_pointer *p, double period)
+/* ---- the side that a pair touches ---- */
+
+/* Whether hull and body came to where they are by motion. */
+static bool pair_leaps(const hapi_tool_pair *pair, const hapi_pointer *p, const hap_pose *at,
+                       double period)
 {
+  double way[3];
+  double turn[4];
+  const double back[4] = {pair->at.quat_wxyz[0], -pair->at.quat_wxyz[1], -pair->at.quat_wxyz[2],
+                          -pair->at.quat_wxyz[3]};
+  hapi_v3_sub(at->position, pair->at.position, way);
+  hapi_quat_multiply(at->quat_wxyz, back, turn);
+  double most = hapi_v3_norm(way) + 2.0 * p->shape.extent * hapi_v3_norm(turn + 1);
+  return p->device.jumped || (pair->placed && most > HAPI_PRESS_SPEED * period);
+}
+
+/* The way out of the geom, by all points that were found last. */
+static void pair_way(const hapi_tool_world *w, const hapi_tool_pair *pair,
+                     const hapi_local_contact *contacts, double out[3])
+{
+  hapi_v3_set(out, 0.0, 0.0, 0.0);
+  for (int round = 0; round < HAPI_TOOL_WAY_ROUNDS; ++round) {
+    for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
+      if (w->tools[k].placed && !w->tools[k].leaving) {
+        hapi_tool_way_add(contacts[k].normal_now, w->tools[k].depth, out);
+      }
+    }
+  }
+}
+
+/* Where the hull would be if it could not enter the geom: whoever looks for the points of the pair
+ * begins there. After a leap no side is known until points were found for what is there now. */
+static void follow_side(const hapi_tool_world *w, hapi_tool_pair *pair,
+                        const hapi_local_contact *contacts, const hapi_pointer *p,
+                        const hapi_local_body *body, const hapi_tick_facts *facts)
+{
+  hap_pose at = p->pose;
+  double way[3];
+  if (body != NULL) {
+    hapi_pose_into(body->pose.position, body->pose.quat_wxyz, &p->pose, &at);
+  }
+  if (pair_leaps(pair, p, &at, facts->period)) {
+    pair->leapt = facts->tick;
+  }
+  pair->at = at;
+  pair->placed = true;
+  pair_way(w, pair, contacts, way);
+  pair->sided = hapi_v3_dot(way, way) > 0.0 && pair->found > pair->leapt;
+  if (pair->sided) {
+    pair->side = (hapi_tool_side){.key = pair->key, .pointer = pair->pointer};
+    pair->side.epoch = body != NULL ? body->epoch : 0;
+    pair->side.place = at;
+    hapi_v3_copy(way, pair->side.way);
+    if (body != NULL) {
+      hapi_quat_unrotate(body->pose.quat_wxyz, way, pair->side.way);
+    }
+    hapi_v3_add(at.position, pair->side.way, pair->side.place.position);
+  }
+}
+
+/* The first pair of a group that has points. */
+static bool leads_group(const hapi_tool_world *w, uint32_t pair)
+{
+  for (uint32_t i = w->pairs[pair].ring; i != pair; i = w->pairs[i].ring) {
+    if (i < pair) {
+      return false;
+    }
+  }
+  return hapi_tool_walk_begin(w, pair).tool != HAPI_SLOT_NONE;
+}
+
+/* The pairs of a group, from one of them on. */
+static void follow_group(hapi_tool_world *w, uint32_t begin, hapi_local_contact *contacts,
+                         const hapi_pointer *p, double period)
+{
+  hapi_tool_pair *pair = &w->pairs[begin];
   double depth = -HUGE_VAL;
-  for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
-    depth = fmax(depth, w->tools[k].depth);
-    set_claim(w, contacts, k, p->shape.extent);
+  hapi_tool_walk at = hapi_tool_walk_begin(w, begin);
+  for (; at.tool != HAPI_SLOT_NONE; hapi_tool_walk_next(w, &at)) {
+    depth = fmax(depth, w->tools[at.tool].depth);
+    set_claim(w, contacts, at.tool, p->shape.extent);
   }
   pair->depth = depth;
-  for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
-    tool_weigh(w, contacts, k);
+  for (at = hapi_tool_walk_begin(w, begin); at.tool != HAPI_SLOT_NONE;
+       hapi_tool_walk_next(w, &at)) {
+    tool_weigh(w, contacts, at.tool);
   }
   double share = hapi_ramp_follow(&pair->ramp, &pair->seen, p, &depth, period);
-  for (uint32_t k = pair->first; k != HAPI_SLOT_NONE; k = w->tools[k].next) {
-    hapi_local_tool *tool = &w->tools[k];
-    hapi_local_contact *c = &contacts[k];
+  for (at = hapi_tool_walk_begin(w, begin); at.tool != HAPI_SLOT_NONE;
+       hapi_tool_walk_next(w, &at)) {
+    hapi_local_tool *tool = &w->tools[at.tool];
+    hapi_local_contact *c = &contacts[at.tool];
     if (!tool->placed) {
       c->weight = tool->felt = 0.0;
       c->ramp.depth = -HUGE_VAL;
@@ -187,17 +269,22 @@ static void follow_pair(hapi_tool_world *w, hapi_tool_pair *pair, hapi_local_con
     c->ramp.excess = pair->ramp.excess;
     tool->depth -= pair->ramp.excess;
   }
+  for (uint32_t i = pair->ring; i != begin; i = w->pairs[i].ring) {
+    w->pairs[i].ramp = pair->ramp;
+    w->pairs[i].seen = true;
+    w->pairs[i].depth = pair->depth;
+  }
 }
 
 void hapi_tool_place(hapi_touches *touches, const hapi_pointers *pointers,
-                     const hapi_bodies *bodies, double period)
+                     const hapi_bodies *bodies, const hapi_tick_facts *facts)
 {
   hapi_tool_world *w = &touches->tool;
   if (w->count == 0) {
     return;
   }
   HAPI_ASSERT(touches->count >= w->count);
-  follow_members(w, period);
+  follow_members(w, facts->period);
   drop_gone(touches, pointers, bodies);
   hapi_local_contact *contacts = hapi_touches_of_tools(touches);
   for (uint32_t i = 0; i < w->count; ++i) {
@@ -207,7 +294,14 @@ void hapi_tool_place(hapi_touches *touches, const hapi_pointers *pointers,
   for (uint32_t i = 0; i < w->pair_count; ++i) {
     hapi_tool_pair *pair = &w->pairs[i];
     if (pair->first != HAPI_SLOT_NONE) {
-      follow_pair(w, pair, contacts, &pointers->of[pair->pointer], period);
+      const hapi_pointer *p = &pointers->of[pair->pointer];
+      const hapi_local_body *body = hapi_bodies_at(bodies, contacts[pair->first].body);
+      follow_side(w, pair, contacts, p, body, facts);
+    }
+  }
+  for (uint32_t i = 0; i < w->pair_count; ++i) {
+    if (leads_group(w, i)) {
+      follow_group(w, i, contacts, &pointers->of[w->pairs[i].pointer], facts->period);
     }
   }
 }

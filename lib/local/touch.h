@@ -125,9 +125,19 @@ typedef struct hapi_tool_pair {
   uint64_t key;
   uint32_t pointer;
   uint32_t first; /* of its tools, by their next */
+  uint64_t group; /* as of its points */
+  uint32_t ring;  /* index of the next pair of the group; itself: it is alone */
+  uint64_t was;   /* scratch of adopting: group before */
+  bool renewed;   /* likewise: there are new points */
   bool seen;
   hapi_ramp ramp; /* of the deepest of them */
   double depth;   /* m, of the deepest, at the last tick */
+  uint64_t found; /* tick of the poses that its points were found with */
+  uint64_t leapt; /* the last tick to which hull or body came by no motion */
+  bool placed;    /* in the last tick, at: */
+  hap_pose at;    /* of the hull, in the body's frame */
+  bool sided;     /* in this tick the hull is in the geom, and its side is known: */
+  hapi_tool_side side;
 } hapi_tool_pair;
 
 /* Of those that are leaving, and of new ones before the old are dropped. */
@@ -142,7 +152,38 @@ typedef struct hapi_tool_world {
   uint32_t count;
   uint32_t pair_count;
   uint32_t capacity; /* hapi_capacity.tool_points */
+  uint64_t found;    /* as of the pairs, of the newest points */
 } hapi_tool_world;
+
+/* The tools of all pairs of a group, from the first of one of them on:
+ * hapi_tool_walk at = hapi_tool_walk_begin(w, pair); at.tool != HAPI_SLOT_NONE; */
+typedef struct hapi_tool_walk {
+  uint32_t tool;
+  uint32_t pair;
+  uint32_t begin;
+} hapi_tool_walk;
+
+/* On to the next pair that has tools. */
+static inline void hapi_tool_walk_turn(const hapi_tool_world *w, hapi_tool_walk *io)
+{
+  while (io->tool == HAPI_SLOT_NONE && w->pairs[io->pair].ring != io->begin) {
+    io->pair = w->pairs[io->pair].ring;
+    io->tool = w->pairs[io->pair].first;
+  }
+}
+
+static inline hapi_tool_walk hapi_tool_walk_begin(const hapi_tool_world *w, uint32_t pair)
+{
+  hapi_tool_walk at = {w->pairs[pair].first, pair, pair};
+  hapi_tool_walk_turn(w, &at);
+  return at;
+}
+
+static inline void hapi_tool_walk_next(const hapi_tool_world *w, hapi_tool_walk *io)
+{
+  io->tool = w->tools[io->tool].next;
+  hapi_tool_walk_turn(w, io);
+}
 
 /* Cross accelerances of the model in use; contact: an index into the touches. */
 typedef struct hapi_crosses {
@@ -206,7 +247,8 @@ static inline void hapi_touches_forget(const hapi_touches *touches, uint32_t poi
   }
   for (uint32_t i = 0; i < touches->tool.pair_count; ++i) {
     if (pointer == HAPI_SLOT_NONE || touches->tool.pairs[i].pointer == pointer) {
-      touches->tool.pairs[i].seen = false;
+      touches->tool.pairs[i].seen = touches->tool.pairs[i].sided = false;
+      touches->tool.pairs[i].found = 0;
     }
   }
 }

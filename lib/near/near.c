@@ -50,6 +50,9 @@ void hapi_nearby_finish(hapi_nearby *nearby)
   hapi_free(hood->vertices);
   hapi_free(hood->hull);
   hapi_free(nearby->tools.points);
+  hapi_free(nearby->tools.marks);
+  hapi_free(nearby->tools.parts);
+  hapi_free(nearby->tools.hits);
   hapi_geom_names_finish(&nearby->tools.names);
   hapi_free(nearby->slots.bodies);
   hapi_free(nearby->slots.contacts);

@@ -77,7 +77,7 @@ static void collect_geom(void *data, dGeomID a, dGeomID b)
  * front of it belongs to the touch. */
 static double deepest_touch(const hapi_nearby *nearby, uint32_t pointer)
 {
-  double deepest = 0.0;
+  double deepest = hapi_tool_depth(nearby, pointer);
   for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
     const hapi_contact_slot *slot = &nearby->slots.contacts[i];
     if (slot->phase == HAPI_SLOT_LIVE && slot->pointer == pointer && slot->last_touch.touched) {
@@ -534,6 +534,24 @@ static void hits_hide(hapi_nearby *nearby, uint32_t count)
   }
 }
 
+/* What is left where geoms adjoin under a hull; model CONTACT finds the points in another thread. */
+static uint32_t hits_join(hapi_nearby *nearby, uint32_t count)
+{
+  hapi_hit *hits = nearby->neighbors.hits;
+  uint32_t kept = 0;
+  if (nearby->cycle->model == HAP_MODEL_CONTACT) {
+    return count;
+  }
+  hapi_tool_join(nearby, count);
+  for (uint32_t i = 0; i < count; ++i) {
+    const hapi_state_pointer *p = &hapi_state_pointers(nearby->cycle->state)[hits[i].pointer];
+    if (p->is_tool == 0 || hits[i].tool_count > 0) {
+      hits[kept++] = hits[i];
+    }
+  }
+  return kept;
+}
+
 void hapi_neighbors_find(hapi_nearby *nearby)
 {
   hapi_neighbors *hood = &nearby->neighbors;
@@ -553,6 +571,7 @@ void hapi_neighbors_find(hapi_nearby *nearby)
   }
   qsort(hood->hits, count, sizeof *hood->hits, hit_by_distance); /* nearest first, for capacity */
   HAPI_ASSERT(count <= hood->candidate_count);
+  count = hits_join(nearby, count);
   count = hood->hit_count = choose_hits(nearby, count);
   hits_hide(nearby, count);
   for (uint32_t i = 0; i < count; ++i) {

@@ -28,6 +28,7 @@ typedef struct hapi_hit {
   hapi_nearest nearest; /* a: pointer, b: geom */
   uint32_t tool_first;  /* of a hull: into the points of hapi_tool_search */
   uint32_t tool_count;  /* 0: a sphere */
+  hap_pose tool_pose;   /* for which they were found */
   bool hidden;          /* of a sphere: by a nearer one, of the same surface */
   double mu;            /* of a hull, of all of its points, once it is taken */
 } hapi_hit;

@@ -279,7 +279,8 @@ static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
   double far = pointer->extent +
                hapi_neighbors_reach(hapi_v3_norm(pointer->twist.linear) +
                                         pointer->extent * hapi_v3_norm(pointer->twist.angular),
-                                    2.0 * nearby->cycle->probe_step_s);
+                                    2.0 * nearby->cycle->probe_step_s) +
+               hapi_tool_depth(nearby, hit->pointer);
   for (int k = 0; k < 6; ++k) {
     box[k] = pointer->pose.position[k / 2] + (k % 2 == 0 ? -far : far);
   }

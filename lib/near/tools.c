@@ -8,6 +8,8 @@
 #include "base/pose.h"
 #include "near/near.h"
 #include "sync/mesh_filter.h"
+#include "sync/tool_seams.h"
+#include "sync/tool_side.h"
 
 /* Pointers that are hulls: the patches between them and the geoms near them. Models SINGLE, IMPULSE
  * and ACCELERANCE have their points from here, each a contact with an A of its own; model CONTACT
@@ -17,38 +19,62 @@
 
 typedef struct tool_search {
   hapi_nearby *nearby;
-  const hapi_state_pointer *pointer;
-  uint32_t index; /* of the pointer */
-  hapi_touch_side tool;
+  const hapi_tool_at *at;
+  hap_pose pose;      /* of the hull */
   hap_pose body_pose; /* of the geom's body */
   bool has_body;
   double margin;
-  uint64_t key;
+  hapi_touch_side other; /* the geom, of one shape */
+  bool has_shape;
+  uint32_t triangles; /* of a mesh, in nearby->meshes.found */
   hapi_found_point found[HAPI_TOOL_SPOTS];
   uint32_t count;
   uint32_t patches;
 } tool_search;
 
-static void add_point(tool_search *s, const hapi_touch_side *other, const hapi_patch_point *in)
+static hapi_touch_side tool_side_at(const tool_search *s, const hap_pose *pose)
+{
+  return (hapi_touch_side){.body = pose,
+                           .pose = *pose,
+                           .shape = {.kind = HAPI_SHAPE_HULL,
+                                     .rounding = s->at->pointer->radius,
+                                     .hull = &s->at->hull->points[0][0],
+                                     .hull_count = s->at->hull->count},
+                           .shape_pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
+}
+
+static hapi_touch_side triangle_side(const hapi_near_triangle *triangle)
+{
+  return (hapi_touch_side){
+      .pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}},
+      .shape = {.kind = HAPI_SHAPE_HULL, .hull = triangle->corners, .hull_count = 3}};
+}
+
+static void add_point(tool_search *s, const hapi_touch_side *tool, const hapi_touch_side *other,
+                      const hapi_patch_point *in)
 {
   HAPI_ASSERT(s->count < HAPI_TOOL_SPOTS);
   HAPI_ASSERT_UNIT(in->normal);
+  const hapi_state_pointer *pointer = s->at->pointer;
+  double away[3];
   hapi_found_point *out = &s->found[s->count++];
   memset(out, 0, sizeof *out);
   out->slot = HAPI_NONE;
-  out->gap = in->gap;
+  hapi_v3_sub(tool->pose.position, s->pose.position, away);
+  out->gap = in->gap - hapi_v3_dot(in->normal, away);
   hapi_v3_copy(in->normal, out->normal);
-  out->tool.pointer = s->index;
-  out->tool.pointer_generation = s->pointer->generation;
-  out->tool.same_within = hapi_tool_same_within(s->pointer->extent);
-  hapi_touch_localise(&s->tool, other, in, &out->tool.at);
-  out->tool.at.key = s->key;
+  hapi_touch_on_shape(other, in, out->on_geom);
+  out->tool.pointer = s->at->index;
+  out->tool.pointer_generation = pointer->generation;
+  out->tool.same_within = hapi_tool_same_within(pointer->extent);
+  hapi_touch_localise(tool, other, in, &out->tool.at);
+  out->tool.at.key = out->tool.group = s->at->key;
   out->tool.at.body_a = HAPI_SLOT_NONE;
 }
 
-/* Against one shape; corners: of a triangle of a mesh, NULL else. */
-static void add_shape(tool_search *s, hapi_touch_side *other, const double *corners,
-                      uint32_t open_edges)
+/* Against one shape; triangle: of a mesh, NULL else. */
+static void add_shape(tool_search *s, const hapi_touch_side *tool, hapi_touch_side *other,
+                      const hapi_near_triangle *triangle)
 {
   hapi_patch patch;
   other->body = s->has_body ? &s->body_pose : NULL;
@@ -56,38 +82,105 @@ static void add_shape(tool_search *s, hapi_touch_side *other, const double *corn
   if (other->body != NULL) {
     hapi_pose_into(other->body->position, other->body->quat_wxyz, &other->pose, &other->shape_pose);
   }
-  if (!hapi_tool_patch(&s->tool, other, s->margin, s->pointer->extent, &patch)) {
+  if (!hapi_tool_patch(tool, other, s->margin, s->at->pointer->extent, &patch)) {
     return;
   }
   for (int i = 0; i < patch.count && s->count < HAPI_TOOL_SPOTS; ++i) {
     hapi_patch_point *point = &patch.points[i];
-    if (corners != NULL) {
-      hapi_mesh_straighten(corners, point);
+    if (triangle != NULL) {
+      hapi_mesh_straighten(triangle->corners, point);
     }
-    if (corners == NULL || hapi_mesh_allows(open_edges, corners, point->normal)) {
-      add_point(s, other, point);
+    if (triangle == NULL ||
+        hapi_mesh_allows(triangle->open_edges, triangle->corners, point->normal)) {
+      add_point(s, tool, other, point);
     }
   }
   ++s->patches;
 }
 
-static void add_mesh(tool_search *s, dGeomID geom)
+/* The points where the hull would touch if it were there, away from where it is. */
+static void search_look(tool_search *s, const double away[3])
+{
+  hap_pose pose = s->pose;
+  hapi_v3_add(pose.position, away, pose.position);
+  const hapi_touch_side tool = tool_side_at(s, &pose);
+  s->count = s->patches = 0;
+  if (s->has_shape) {
+    add_shape(s, &tool, &s->other, NULL);
+  }
+  for (uint32_t i = 0; i < s->triangles; ++i) {
+    const hapi_near_triangle *triangle = &s->nearby->meshes.found[i];
+    hapi_touch_side other = triangle_side(triangle);
+    add_shape(s, &tool, &other, triangle);
+  }
+}
+
+/* As hapi_tool_distance. */
+static bool search_distance(void *of, const hap_pose *hull, double *out_distance,
+                            double out_normal[3])
+{
+  const tool_search *s = of;
+  const hapi_touch_side a = tool_side_at(s, hull);
+  double normal[3];
+  double distance;
+  *out_distance = HUGE_VAL;
+  if (s->has_shape) {
+    return hapi_patch_distance(&a.shape, &a.pose, &s->other.shape, &s->other.pose, out_distance,
+                               out_normal);
+  }
+  for (uint32_t i = 0; i < s->triangles; ++i) {
+    const hapi_touch_side b = triangle_side(&s->nearby->meshes.found[i]);
+    if (hapi_patch_distance(&a.shape, &a.pose, &b.shape, &b.pose, &distance, normal) &&
+        distance < *out_distance) {
+      *out_distance = distance;
+      hapi_v3_copy(normal, out_normal);
+    }
+  }
+  return *out_distance < HUGE_VAL;
+}
+
+static void search_spots(const tool_search *s, hapi_tool_spots *out)
+{
+  for (uint32_t i = 0; i < s->count; ++i) {
+    hapi_v3_copy(s->found[i].tool.at.core_a, out->places[i]);
+    hapi_v3_copy(s->found[i].normal, out->normals[i]);
+    out->gaps[i] = s->found[i].gap;
+  }
+  out->count = s->count;
+}
+
+/* Where the hull is deep in the geom, or behind it, the points of the side that it touches. */
+static void search_keep_side(tool_search *s)
+{
+  hapi_tool_spots spots;
+  double away[3];
+  const hapi_tool_seek seek = {.told = s->at->side,
+                               .body = s->has_body ? &s->body_pose : NULL,
+                               .hull = &s->pose,
+                               .extent = s->at->pointer->extent,
+                               .distance = search_distance,
+                               .geom = s};
+  search_spots(s, &spots);
+  if (hapi_tool_side_seek(&seek, &spots, away)) {
+    search_look(s, away);
+  }
+}
+
+/* The triangles that the hull may touch, also on its way back to where it touched. */
+static void search_mesh(tool_search *s)
 {
   double box[6];
-  double far = s->pointer->extent + s->margin;
+  double far = s->at->pointer->extent + s->margin;
+  if (s->at->side != NULL) {
+    far += hapi_v3_norm(s->at->side->way);
+  }
   for (int k = 0; k < 3; ++k) {
-    box[2 * k] = s->tool.pose.position[k] - far;
-    box[2 * k + 1] = s->tool.pose.position[k] + far;
+    box[2 * k] = s->pose.position[k] - far;
+    box[2 * k + 1] = s->pose.position[k] + far;
   }
-  uint32_t count = hapi_mesh_near(s->nearby, geom, box, s->nearby->cycle->model_number + 1);
-  for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
-    const hapi_near_triangle *triangle = &s->nearby->meshes.found[i];
-    hapi_touch_side other = {
-        .pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}},
-        .shape = {.kind = HAPI_SHAPE_HULL, .hull = triangle->corners, .hull_count = 3}};
-    add_shape(s, &other, triangle->corners, triangle->open_edges);
-  }
+  uint32_t count = hapi_mesh_near(s->nearby, s->at->geom, box, s->nearby->cycle->model_number + 1);
   s->nearby->counts.dropped += count == HAPI_NEAR_TRIANGLES;
+  s->triangles = count < HAPI_NEAR_TRIANGLES ? count : 0;
 }
 
 static void search_reduce(tool_search *s)
@@ -98,12 +191,7 @@ static void search_reduce(tool_search *s)
   if (s->patches < 2) {
     return;
   }
-  for (uint32_t i = 0; i < s->count; ++i) {
-    hapi_v3_copy(s->found[i].tool.at.core_a, spots.places[i]);
-    hapi_v3_copy(s->found[i].normal, spots.normals[i]);
-    spots.gaps[i] = s->found[i].gap;
-  }
-  spots.count = s->count;
+  search_spots(s, &spots);
   uint32_t count = hapi_tool_reduce(&spots, kept);
   memset(found, 0, sizeof found);
   for (uint32_t i = 0; i < count; ++i) {
@@ -125,29 +213,21 @@ uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer)
   return hapi_tool_key(key, pointer, hapi_state_pointers(nearby->cycle->state)[pointer].generation);
 }
 
-/* The points of the pointer where that pose puts it. */
-static void search_find(tool_search *s, hapi_nearby *nearby, const hapi_tool_at *at,
-                        const hap_pose *pose)
+/* For the pointer where that pose puts it. */
+static void search_begin(tool_search *s, hapi_nearby *nearby, const hapi_tool_at *at,
+                         const hap_pose *pose)
 {
   const hapi_state_pointer *pointer = at->pointer;
   dBodyID body = dGeomGetBody(at->geom);
-  hapi_touch_side other;
   s->nearby = nearby;
-  s->index = at->index;
-  s->pointer = pointer;
-  s->tool = (hapi_touch_side){.body = pose,
-                              .pose = *pose,
-                              .shape = {.kind = HAPI_SHAPE_HULL,
-                                        .rounding = pointer->radius,
-                                        .hull = &at->hull->points[0][0],
-                                        .hull_count = at->hull->count},
-                              .shape_pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
+  s->at = at;
+  s->pose = *pose;
   s->has_body = body != NULL;
   if (s->has_body) {
     hapi_pose_read(body, &s->body_pose);
   }
-  s->key = at->key;
-  s->count = s->patches = 0;
+  s->triangles = 0;
+  s->has_shape = false;
   /* How fast a point of the pointer may come nearer to the geom. */
   double speed = hapi_neighbors_speed(at->geom, pointer, pointer->pose.position) +
                  pointer->extent * hapi_v3_norm(pointer->twist.angular) +
@@ -155,14 +235,25 @@ static void search_find(tool_search *s, hapi_nearby *nearby, const hapi_tool_at 
   s->margin = fmin(at->reach, hapi_neighbors_reach(speed, at->horizon));
   int kind = dGeomGetClass(at->geom);
   if (kind == dTriMeshClass) {
-    add_mesh(s, at->geom);
-  } else if (kind == dConvexClass ? hapi_hull_of_convex(nearby, at->geom, &other.shape, &other.pose)
-                                  : hapi_shape_of_geom(at->geom, &other.shape, &other.pose)) {
-    add_shape(s, &other, NULL, 0);
-  } else if (kind != dConvexClass) {
-    hapi_say_once(nearby->cycle, &nearby->tools.said_not_touched,
-                  "a pointer that is a hull does not touch heightfields and geoms of user-made "
-                  "classes; take a trimesh there");
+    search_mesh(s);
+  } else if (kind == dConvexClass) {
+    s->has_shape = hapi_hull_of_convex(nearby, at->geom, &s->other.shape, &s->other.pose);
+  } else {
+    s->has_shape = hapi_shape_of_geom(at->geom, &s->other.shape, &s->other.pose);
+    if (!s->has_shape) {
+      hapi_say_once(nearby->cycle, &nearby->tools.said_not_touched,
+                    "a pointer that is a hull does not touch heightfields and geoms of user-made "
+                    "classes; take a trimesh there");
+    }
+  }
+}
+
+static void search_find(tool_search *s)
+{
+  static const double here[3] = {0.0, 0.0, 0.0};
+  search_look(s, here);
+  if (s->at->side != NULL) {
+    search_keep_side(s);
   }
 }
 
@@ -170,15 +261,30 @@ uint32_t hapi_tool_points(hapi_nearby *nearby, const hapi_tool_at *at,
                           hapi_found_point out[HAPI_TOOL_SPOTS])
 {
   tool_search s;
-  search_find(&s, nearby, at, &at->pointer->pose);
+  search_begin(&s, nearby, at, &at->pointer->pose);
+  search_find(&s);
   search_reduce(&s);
   memcpy(out, s.found, s.count * sizeof *out);
   return s.count;
 }
 
-static void fill_hit(hapi_nearby *nearby, const tool_search *s, hapi_hit *out)
+/* Behind all others; false: no memory, or there are none. */
+static bool store_points(hapi_nearby *nearby, const tool_search *s, hapi_hit *io)
 {
   hapi_tool_search *tools = &nearby->tools;
+  if (s->count == 0 || !hapi_reserve((void **)&tools->points, &tools->capacity, tools->count,
+                                     s->count, sizeof s->found[0])) {
+    return false;
+  }
+  io->tool_first = tools->count;
+  io->tool_count = s->count;
+  memcpy(&tools->points[tools->count], s->found, s->count * sizeof s->found[0]);
+  tools->count += s->count;
+  return true;
+}
+
+static void fill_hit(const tool_search *s, hapi_hit *out)
+{
   uint32_t deepest = 0;
   for (uint32_t i = 1; i < s->count; ++i) {
     deepest = s->found[i].gap < s->found[deepest].gap ? i : deepest;
@@ -186,14 +292,38 @@ static void fill_hit(hapi_nearby *nearby, const tool_search *s, hapi_hit *out)
   const hapi_found_point *best = &s->found[deepest];
   out->nearest = (hapi_nearest){.distance = best->gap};
   hapi_v3_copy(best->normal, out->nearest.normal);
-  hapi_pose_point(s->tool.pose.position, s->tool.pose.quat_wxyz, best->tool.at.core_a,
-                  out->nearest.point_a);
+  hapi_pose_point(s->pose.position, s->pose.quat_wxyz, best->tool.at.core_a, out->nearest.point_a);
   hapi_v3_copy(out->nearest.point_a, out->nearest.point_b);
-  HAPI_ASSERT(s->count > 0 && tools->count + s->count <= tools->capacity);
-  out->tool_first = tools->count;
-  out->tool_count = s->count;
-  memcpy(&tools->points[tools->count], s->found, s->count * sizeof s->found[0]);
-  tools->count += s->count;
+  out->tool_pose = s->pose;
+}
+
+/* What the loop last told of hull and geom; NULL: nothing that is of use. */
+static const hapi_tool_side *told_side(hapi_nearby *nearby, const hapi_candidate *candidate,
+                                       uint64_t key)
+{
+  const hapi_tool_side *side =
+      hapi_tool_side_find(hapi_state_sides(nearby->cycle->state), nearby->cycle->state->side_count,
+                          key, candidate->pointer);
+  dBodyID body = dGeomGetBody(candidate->geom);
+  if (side == NULL || body == NULL) {
+    return side;
+  }
+  uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
+  uint32_t slot = known != HAPI_NONE ? nearby->world->bodies.entries[known].slot : HAPI_NONE;
+  bool same = slot != HAPI_NONE && nearby->slots.bodies[slot].epoch == side->epoch;
+  return same ? side : NULL;
+}
+
+double hapi_tool_depth(const hapi_nearby *nearby, uint32_t pointer)
+{
+  const hapi_tool_side *sides = hapi_state_sides(nearby->cycle->state);
+  double deepest = 0.0;
+  for (uint32_t i = 0; i < nearby->cycle->state->side_count; ++i) {
+    if (sides[i].pointer == pointer) {
+      deepest = fmax(deepest, hapi_v3_norm(sides[i].way));
+    }
+  }
+  return deepest;
 }
 
 bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *out)
@@ -201,11 +331,13 @@ bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_h
   tool_search s;
   const hapi_state_pointer *pointer =
       &hapi_state_pointers(nearby->cycle->state)[candidate->pointer];
+  uint64_t key = hapi_tool_geom_key(nearby, candidate->geom, candidate->pointer);
   const hapi_tool_at at = {.geom = candidate->geom,
                            .index = candidate->pointer,
                            .pointer = pointer,
                            .hull = &hapi_state_hulls(nearby->cycle->state)[candidate->pointer],
-                           .key = hapi_tool_geom_key(nearby, candidate->geom, candidate->pointer),
+                           .key = key,
+                           .side = told_side(nearby, candidate, key),
                            .reach = candidate->reach,
                            .horizon = nearby->cycle->probe_step_s};
   hap_pose pose = pointer->pose;
@@ -213,7 +345,8 @@ bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_h
     hapi_pose_move(&pose, &pointer->twist, at.horizon);
   }
   for (int attempt = 0; attempt < 2; ++attempt) {
-    search_find(&s, nearby, &at, &pose);
+    search_begin(&s, nearby, &at, &pose);
+    search_find(&s);
     bool buried = s.count == 0 || s.found[0].gap < -0.25 * pointer->extent;
     if (!buried || hapi_cycle_steps_to_now(nearby->cycle)) {
       break;
@@ -221,12 +354,148 @@ bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_h
     pose = pointer->pose; /* the far face must not be taken for the near one */
   }
   search_reduce(&s);
-  if (s.count == 0 || !hapi_reserve((void **)&nearby->tools.points, &nearby->tools.capacity,
-                                    nearby->tools.count, s.count, sizeof s.found[0])) {
+  if (!store_points(nearby, &s, out)) {
     return false;
   }
-  fill_hit(nearby, &s, out);
+  fill_hit(&s, out);
   return true;
+}
+
+/* ---- where geoms adjoin, as tool_seams.h asks ---- */
+
+/* The parts are the hits of hulls. */
+typedef struct tool_join {
+  hapi_nearby *nearby;
+  hapi_tool_seams *seams;
+  tool_search search; /* scratch */
+} tool_join;
+
+static hapi_hit *join_hit(const tool_join *join, uint32_t part)
+{
+  return &join->nearby->neighbors.hits[join->nearby->tools.hits[part]];
+}
+
+static hapi_tool_at join_at(const tool_join *join, uint32_t part)
+{
+  hapi_nearby *nearby = join->nearby;
+  const hapi_hit *hit = join_hit(join, part);
+  return (hapi_tool_at){.geom = hit->geom,
+                        .index = hit->pointer,
+                        .pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer],
+                        .hull = &hapi_state_hulls(nearby->cycle->state)[hit->pointer],
+                        .key = join->seams->parts[part].key,
+                        .reach = HUGE_VAL,
+                        .horizon = nearby->cycle->probe_step_s};
+}
+
+static bool join_holds(void *of, uint32_t part, const double point[3], double within)
+{
+  tool_join *join = of;
+  hapi_nearest nearest;
+  return hapi_geom_nearest(join->nearby, join_hit(join, part)->geom, point, 0.0, within, &nearest);
+}
+
+static double join_depth(void *of, uint32_t part, const double away[3])
+{
+  tool_join *join = of;
+  double distance;
+  double normal[3];
+  const hapi_tool_at at = join_at(join, part);
+  search_begin(&join->search, join->nearby, &at, &join_hit(join, part)->tool_pose);
+  hap_pose pose = join->search.pose;
+  hapi_v3_add(pose.position, away, pose.position);
+  return search_distance(&join->search, &pose, &distance, normal) ? -distance : -HUGE_VAL;
+}
+
+/* The marks of the part's points. */
+static bool join_mark(const tool_join *join, uint32_t part)
+{
+  hapi_tool_search *tools = &join->nearby->tools;
+  const hapi_hit *hit = join_hit(join, part);
+  hapi_tool_part *to = &join->seams->parts[part];
+  uint32_t end = hit->tool_first + hit->tool_count;
+  uint32_t known = end < tools->mark_capacity ? end : tools->mark_capacity;
+  if (!hapi_reserve((void **)&tools->marks, &tools->mark_capacity, known, end - known,
+                    sizeof *tools->marks)) {
+    return false;
+  }
+  join->seams->marks = tools->marks;
+  to->first = hit->tool_first;
+  to->count = hit->tool_count;
+  for (uint32_t i = hit->tool_first; i < end; ++i) {
+    const hapi_found_point *from = &tools->points[i];
+    hapi_tool_mark *mark = &tools->marks[i];
+    *mark = (hapi_tool_mark){.gap = from->gap, .border = from->tool.at.slide != HAPI_SLIDE_NONE};
+    hapi_v3_copy(from->on_geom, mark->at);
+    hapi_v3_copy(from->tool.at.core_a, mark->place);
+    hapi_v3_copy(from->normal, mark->normal);
+  }
+  return true;
+}
+
+static void join_look(void *of, uint32_t part, const double away[3])
+{
+  tool_join *join = of;
+  hapi_hit *hit = join_hit(join, part);
+  hapi_tool_part *to = &join->seams->parts[part];
+  const hapi_tool_at at = join_at(join, part);
+  search_begin(&join->search, join->nearby, &at, &hit->tool_pose);
+  search_look(&join->search, away);
+  search_reduce(&join->search);
+  to->count = hit->tool_count = 0;
+  if (store_points(join->nearby, &join->search, hit)) {
+    fill_hit(&join->search, hit);
+    (void)join_mark(join, part);
+  }
+}
+
+/* What is left of the part's points. */
+static void join_keep(const tool_join *join, uint32_t part)
+{
+  hapi_hit *hit = join_hit(join, part);
+  const hapi_tool_part *from = &join->seams->parts[part];
+  hapi_found_point *points = join->nearby->tools.points;
+  hit->tool_count = 0;
+  for (uint32_t i = from->first; i < from->first + from->count; ++i) {
+    if (!join->seams->marks[i].dropped) {
+      hapi_found_point *to = &points[hit->tool_first + hit->tool_count++];
+      *to = points[i];
+      to->tool.group = from->group;
+    }
+  }
+}
+
+void hapi_tool_join(hapi_nearby *nearby, uint32_t count)
+{
+  hapi_tool_search *tools = &nearby->tools;
+  tool_join join = {.nearby = nearby};
+  hapi_tool_seams seams = {
+      .of = &join, .holds = join_holds, .depth = join_depth, .look = join_look};
+  join.seams = &seams;
+  for (uint32_t i = 0; i < count; ++i) {
+    const hapi_hit *hit = &nearby->neighbors.hits[i];
+    if (hit->tool_count == 0 ||
+        !hapi_reserve((void **)&tools->parts, &tools->part_capacity, seams.count, 1,
+                      sizeof *tools->parts) ||
+        !hapi_reserve((void **)&tools->hits, &tools->hit_capacity, seams.count, 1,
+                      sizeof *tools->hits)) {
+      continue;
+    }
+    seams.parts = tools->parts;
+    tools->hits[seams.count] = i;
+    tools->parts[seams.count] =
+        (hapi_tool_part){.key = tools->points[hit->tool_first].tool.at.key,
+                         .hull = hit->pointer,
+                         .extent = hapi_state_pointers(nearby->cycle->state)[hit->pointer].extent};
+    seams.count += join_mark(&join, seams.count);
+  }
+  if (seams.count < 2) {
+    return;
+  }
+  hapi_tool_seams_join(&seams);
+  for (uint32_t i = 0; i < seams.count; ++i) {
+    join_keep(&join, i);
+  }
 }
 
 /* ---- contacts ---- */

@@ -13,13 +13,15 @@
 #include "near/geom_names.h"
 #include "near/neighbors.h"
 #include "sync/messages.h"
+#include "sync/tool_seams.h"
 #include "sync/touch_local.h"
 
 typedef struct hapi_found_point {
   hapi_tool_point tool;
   double gap;
-  double normal[3]; /* world, out of the geom */
-  uint32_t slot;    /* of the contact that it goes on with; HAPI_NONE: none */
+  double normal[3];  /* world, out of the geom */
+  double on_geom[3]; /* m, world */
+  uint32_t slot;     /* of the contact that it goes on with; HAPI_NONE: none */
 } hapi_found_point;
 
 /* A hull that is looked at beside a geom. */
@@ -28,9 +30,10 @@ typedef struct hapi_tool_at {
   uint32_t index; /* of the pointer */
   const hapi_state_pointer *pointer;
   const hapi_tool_hull *hull;
-  uint64_t key;   /* of the two */
-  double reach;   /* m, at most */
-  double horizon; /* s, for which what may come to touch is of interest */
+  uint64_t key;               /* of the two */
+  double reach;               /* m, at most */
+  double horizon;             /* s, for which what may come to touch is of interest */
+  const hapi_tool_side *side; /* that it touches; NULL: none is known */
 } hapi_tool_at;
 
 /* Points of all hits of a cycle. */
@@ -38,14 +41,24 @@ typedef struct hapi_tool_search {
   hapi_found_point *points;
   uint32_t count;
   uint32_t capacity;
+  hapi_tool_mark *marks; /* of the points; scratch, as the next */
+  uint32_t mark_capacity;
+  hapi_tool_part *parts;
+  uint32_t part_capacity;
+  uint32_t *hits; /* of the parts */
+  uint32_t hit_capacity;
   hapi_geom_names names;
   bool said_not_touched; /* of a heightfield by a hull, once a session */
 } hapi_tool_search;
 
+/* m: how deep the pointer was in a geom, at the loop's newest message. */
+double hapi_tool_depth(const hapi_nearby *nearby, uint32_t pointer);
 bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *out);
 /* The points of a hull where the pointer's pose puts it, each with its gap; returns how many. */
 uint32_t hapi_tool_points(hapi_nearby *nearby, const hapi_tool_at *at,
                           hapi_found_point out[HAPI_TOOL_SPOTS]);
+/* Where geoms adjoin under a hull, of the first hits: some may have no points left. */
+void hapi_tool_join(hapi_nearby *nearby, uint32_t count);
 uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer);
 void hapi_tool_keep_places(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body);
 void hapi_tool_take(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body);

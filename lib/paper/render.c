@@ -230,7 +230,7 @@ void hapi_render(const hapi_tick_facts *facts, const hapi_pointers *pointers,
     p->wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   }
   touches->pushing = 0;
-  hapi_tool_place(touches, pointers, bodies, facts->period);
+  hapi_tool_place(touches, pointers, bodies, facts);
   for (uint32_t i = 0; i < touches->count; ++i) {
     hapi_local_contact *c = &touches->of[i];
     render_contact(facts, &pointers->of[c->pointer], bodies, touches, c, sample);

@@ -333,6 +333,7 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
   HAPI_ASSERT(cycle->probe_step_s > 0.0);
   out->number = cycle->model_number;
   out->state_ns = state_ns;
+  out->tick = cycle->state != NULL ? cycle->state->tick : 0;
   out->valid_from_ns = valid_from_ns;
   out->blend_s = cycle->model == HAP_MODEL_IMPULSE ? cycle->probe_step_s : 0.0;
   out->model = cycle->model;

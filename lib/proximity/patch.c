@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "base/assert.h"
 #include "base/vec.h"
+#include "proximity/closed_forms.h"
 #include "proximity/patch_parts.h"
 
 static void swap_vectors(double u[3], double v[3])
@@ -96,5 +97,29 @@ bool hapi_patch_find(const hapi_shape *a, const hap_pose *pose_a, const hapi_sha
       hapi_v3_scale(-1.0, point->normal, point->normal);
     }
   }
+  return true;
+}
+
+bool hapi_patch_distance(const hapi_shape *a, const hap_pose *pose_a, const hapi_shape *b,
+                         const hap_pose *pose_b, double *out_distance, double out_normal[3])
+{
+  hapi_solid solid[2];
+  hapi_nearest nearest;
+  hapi_gjk guess;
+  hapi_gjk cores;
+  if (!hapi_pair_place(a, pose_a, b, pose_b, solid)) {
+    return false;
+  }
+  if (hapi_closed_form(&solid[0], &solid[1], &nearest)) {
+    *out_distance = nearest.distance;
+    hapi_v3_copy(nearest.normal, out_normal);
+    return true;
+  }
+  (void)hapi_patch_guess(&solid[0], &solid[1], &guess);
+  if (!hapi_patch_axis(&solid[0], &solid[1], &guess, &cores)) {
+    return false;
+  }
+  *out_distance = cores.distance - solid[0].ball - solid[1].ball;
+  hapi_v3_copy(cores.normal, out_normal);
   return true;
 }

@@ -67,4 +67,10 @@ typedef struct hapi_patch {
 bool hapi_patch_find(const hapi_shape *a, const hap_pose *pose_a, const hapi_shape *b,
                      const hap_pose *pose_b, double margin, hapi_patch *out);
 
+/* Distance [m] of the surfaces and its direction (unit, world, from b to a), as patches have them;
+ * negative: how deep they are in each other along it. Allocates as hapi_patch_find does. False:
+ * there is no answer. */
+bool hapi_patch_distance(const hapi_shape *a, const hap_pose *pose_a, const hapi_shape *b,
+                         const hap_pose *pose_b, double *out_distance, double out_normal[3]);
+
 #endif

@@ -69,6 +69,7 @@ static const message_array arrays[] = {
     STATE(hulls_offset, pointer_count, hapi_tool_hull, pointers),
     STATE(springs_offset, spring_count, hapi_state_spring, springs),
     STATE(joints_offset, joint_count, hapi_state_joint, joints),
+    STATE(sides_offset, side_count, hapi_tool_side, tool_points),
 #define NEAR(...) ARRAY(HAPI_CHANNEL_NEAR, hapi_near, __VA_ARGS__)
     NEAR(bodies_offset, body_count, hapi_near_body, bodies),
     NEAR(geoms_offset, geom_count, hapi_near_geom, geoms),
@@ -79,6 +80,7 @@ static const message_array arrays[] = {
 #define POSES(...) ARRAY(HAPI_CHANNEL_POSES, hapi_poses, __VA_ARGS__)
     POSES(bodies_offset, body_count, hapi_poses_body, bodies),
     POSES(pointers_offset, pointer_count, hapi_poses_pointer, pointers),
+    POSES(sides_offset, side_count, hapi_tool_side, tool_points),
 #define PATCHES(...) ARRAY(HAPI_CHANNEL_PATCHES, hapi_patches, __VA_ARGS__)
     PATCHES(contacts_offset, contact_count, hapi_patch_contact, contacts),
     PATCHES(surfaces_offset, surface_count, hapi_surface, contacts),

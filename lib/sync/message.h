@@ -40,6 +40,15 @@ typedef struct hapi_tool_hull {
   double points[HAPI_TOOL_POINTS_MAX][3];
 } hapi_tool_hull;
 
+/* The side on which a pointer's hull touches a geom. Frame of the geom's body. */
+typedef struct hapi_tool_side {
+  uint64_t key; /* of hull and geom */
+  uint32_t pointer;
+  uint32_t epoch; /* of the body */
+  hap_pose place; /* of the hull if it could not enter the geom */
+  double way[3];  /* m, from where it is to there */
+} hapi_tool_side;
+
 /* Defines function(message), which gives the array that lies offset bytes behind the message's
  * begin; 0: the message has no such array. */
 /* NOLINTBEGIN(bugprone-macro-parentheses): types */

@@ -196,6 +196,7 @@ typedef struct hapi_model_cross {
 
 typedef struct hapi_model {
   uint64_t number;       /* 1, 2, 3 ... */
+  uint64_t tick;         /* of the hapi_state that it was made from */
   int64_t state_ns;      /* time for which poses, A and b hold */
   int64_t valid_from_ns; /* the loop uses the message from this time on */
   int64_t sent_ns;       /* drive FRAME: when physics computed, state_ns or later; else 0 */

@@ -95,14 +95,18 @@ typedef struct hapi_poses_pointer {
 } hapi_poses_pointer;
 
 typedef struct hapi_poses {
+  uint64_t tick;         /* the next one */
   uint64_t model_number; /* the local model in use */
   uint32_t body_count;
   uint32_t pointer_count;
+  uint32_t side_count;
   uint32_t bodies_offset;
   uint32_t pointers_offset;
+  uint32_t sides_offset;
 } hapi_poses;
 
 HAPI_MESSAGE_ARRAY(hapi_poses_bodies, hapi_poses, hapi_poses_body, bodies_offset)
 HAPI_MESSAGE_ARRAY(hapi_poses_pointers, hapi_poses, hapi_poses_pointer, pointers_offset)
+HAPI_MESSAGE_ARRAY(hapi_poses_sides, hapi_poses, hapi_tool_side, sides_offset)
 
 #endif

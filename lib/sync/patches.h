@@ -69,12 +69,14 @@ typedef struct hapi_tool_point {
   uint32_t pointer_generation;
   double same_within; /* m, pointer's frame: a new point matches an old one nearer than this */
   double mu;          /* friction of the pointer against the geom; 0: none */
+  uint64_t group;     /* the same for the points of all pairs that adjoin, see tool_seams.h */
   hapi_patch_contact at;
 } hapi_tool_point;
 
 typedef struct hapi_patches {
   uint64_t number;       /* 1, 2, 3 ... */
   uint64_t model_number; /* of the hapi_near that it was made from */
+  uint64_t tick;         /* of the hapi_poses */
   int64_t valid_from_ns; /* the loop uses the message from this time on */
   uint32_t contact_count;
   uint32_t surface_count;

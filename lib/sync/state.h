@@ -81,6 +81,7 @@ typedef struct hapi_state_spring {
 } hapi_state_spring;
 
 typedef struct hapi_state {
+  uint64_t tick;           /* the next one */
   uint64_t model_number;   /* the local model in use; 0: none yet */
   int64_t now_ns;          /* time for which the poses hold */
   double hand_impulse[3];  /* N s, given to bodies that can move by all pointers since start */
@@ -99,6 +100,8 @@ typedef struct hapi_state {
   uint32_t springs_offset;
   uint32_t joint_count;
   uint32_t joints_offset;
+  uint32_t side_count;
+  uint32_t sides_offset;
 } hapi_state;
 
 HAPI_MESSAGE_ARRAY(hapi_state_bodies, hapi_state, hapi_state_body, bodies_offset)
@@ -106,6 +109,7 @@ HAPI_MESSAGE_ARRAY(hapi_state_contacts, hapi_state, hapi_state_contact, contacts
 HAPI_MESSAGE_ARRAY(hapi_state_pointers, hapi_state, hapi_state_pointer, pointers_offset)
 HAPI_MESSAGE_ARRAY(hapi_state_springs, hapi_state, hapi_state_spring, springs_offset)
 HAPI_MESSAGE_ARRAY(hapi_state_joints, hapi_state, hapi_state_joint, joints_offset)
+HAPI_MESSAGE_ARRAY(hapi_state_sides, hapi_state, hapi_tool_side, sides_offset)
 
 /* By pointer; not set for a sphere. */
 HAPI_MESSAGE_ARRAY(hapi_state_hulls, hapi_state, hapi_tool_hull, hulls_offset)

@@ -82,6 +82,26 @@ bool hapi_tool_patch(const hapi_touch_side *a, const hapi_touch_side *b, double 
   return true;
 }
 
+void hapi_touch_on_shape(const hapi_touch_side *b, const hapi_patch_point *in, double out[3])
+{
+  if (in->touch == HAPI_TOUCH_FACE_B) { /* the plane's point may be any */
+    hapi_v3_madd(in->core_a, -(in->ball_a + in->gap), in->normal, out);
+    return;
+  }
+  hapi_v3_madd(in->core_b, in->ball_b, in->normal, out);
+  if (in->rim_b > 0.0) {
+    const double z[3] = {0.0, 0.0, 1.0};
+    double axis[3];
+    double across[3];
+    hapi_quat_rotate(b->pose.quat_wxyz, z, axis);
+    hapi_v3_madd(in->normal, -hapi_v3_dot(in->normal, axis), axis, across);
+    double length = hapi_v3_norm(across);
+    if (length > 0.0) {
+      hapi_v3_madd(out, in->rim_b / length, across, out);
+    }
+  }
+}
+
 /* ---- of many points few ---- */
 
 /* See tool_place.c: on a steeper face what lies behind the deepest points adds nothing. */

@@ -25,12 +25,16 @@ void hapi_touch_localise(const hapi_touch_side *a, const hapi_touch_side *b,
 bool hapi_tool_patch(const hapi_touch_side *a, const hapi_touch_side *b, double margin,
                      double extent, hapi_patch *out);
 
+/* Where a point of the patch of a hull (a) and a shape (b) is on the shape [m, world]. */
+void hapi_touch_on_shape(const hapi_touch_side *b, const hapi_patch_point *in, double out[3]);
+
 #define HAPI_TOOL_SPOTS 128u      /* of a hull and a mesh, before they are reduced */
 #define HAPI_TOOL_PAIR_POINTS 12u /* ... and after */
 
 /* Where a hull touches the triangles of a mesh. */
 typedef struct hapi_tool_spots {
   double places[HAPI_TOOL_SPOTS][3];  /* m, on the hull */
+  double on_geom[HAPI_TOOL_SPOTS][3]; /* m, world, on the geom, where the hull was then */
   double normals[HAPI_TOOL_SPOTS][3]; /* world */
   double gaps[HAPI_TOOL_SPOTS];
   uint32_t count;

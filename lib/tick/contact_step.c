@@ -430,7 +430,7 @@ static void rows_make(hapi_tick *tick)
   hapi_effect_sample *sample = &tick->sample;
   const hapi_patches *patches = tick->contacts.patches;
   if (tick->touches.tool.count > 0) {
-    hapi_tool_place(&tick->touches, &tick->pointers, &tick->bodies, tick->facts.period);
+    hapi_tool_place(&tick->touches, &tick->pointers, &tick->bodies, &tick->facts);
   }
   hapi_pointer_rows(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, rows, sample);
   uint32_t of_pointers = rows->solver.row_count;

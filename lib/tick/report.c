@@ -115,6 +115,20 @@ static void report_joints(const hapi_joints *from, hapi_state *out)
   }
 }
 
+/* As many as there are pairs with points that are not leaving, of which there is one at least. */
+static uint32_t report_sides(const hapi_tool_world *w, hapi_tool_side *out)
+{
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < w->pair_count; ++i) {
+    const hapi_tool_pair *pair = &w->pairs[i];
+    if (pair->first != HAPI_SLOT_NONE && pair->sided) {
+      HAPI_ASSERT_INDEX(count, w->capacity);
+      out[count++] = pair->side;
+    }
+  }
+  return count;
+}
+
 /* The places of those that have not come yet were cleared at start. */
 static void report_pointers(const hapi_pointers *from, hapi_state *out)
 {
@@ -152,6 +166,8 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   report_springs(&tick->touches, tick->facts.tick, out);
   report_joints(&tick->joints, out);
   report_pointers(&tick->pointers, out);
+  out->tick = tick->facts.tick;
+  out->side_count = report_sides(&tick->touches.tool, hapi_state_sides(out));
 }
 
 /* Whether the loop's pose is the body's, and not what it makes do with until the next sync: a body
@@ -267,6 +283,8 @@ void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
   out->body_count = tick->bodies.live_count;
   out->pointer_count = tick->pointers.high;
   out->model_number = tick->facts.model_number;
+  out->tick = tick->facts.tick;
+  out->side_count = report_sides(&tick->touches.tool, hapi_poses_sides(out));
   for (uint32_t i = 0; i < tick->pointers.high; ++i) {
     const hapi_pointer *in = &tick->pointers.of[i];
     hapi_poses_pointer *to = &hapi_poses_pointers(out)[i];
