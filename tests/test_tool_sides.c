@@ -113,7 +113,7 @@ static void check_press(const press *t)
   w.tool_expert.coupling_stiffness = K;
   (void)sheet_add(&s, &w, t->kind, t->thick);
   tool_go(&w, 0.003, 0.002, HALF + 0.1, 0.0);
-  REQUIRE(tool_start(&w));
+  tool_start(&w);
   double stiffness = t->coupling == HAP_COUPLING_PROXY ? 0.5 * K : K;
   int ticks = (int)(0.13 / (1e-3 * t->speed));
   tool_move(&w, 0.003, 0.002, HALF - 0.03, 0.0, ticks);
@@ -180,7 +180,7 @@ TEST(a_jump_through_a_sheet_is_no_touch)
     world_begin(&w, HAP_MODEL_CONTACT, 60.0);
     (void)sheet_add(&s, &w, (sheet_kind)kind, 0.001);
     tool_go(&w, 0.003, 0.002, HALF + 0.01, 0.0);
-    REQUIRE(tool_start(&w));
+    tool_start(&w);
     tool_move(&w, 0.003, 0.002, HALF - 0.002, 0.0, 200);
     CHECK_NEAR(w.state.wrench.force[2], 2.0, 1e-6);
     tool_go(&w, 0.003, 0.002, -0.04, 0.0);
@@ -204,7 +204,7 @@ TEST(a_sheet_that_is_put_away_lets_go)
   dBodySetKinematic(body);
   dBodySetPosition(body, 0.0, 0.0, -0.0005);
   tool_go(&w, 0.003, 0.002, HALF + 0.01, 0.0);
-  REQUIRE(tool_start(&w));
+  tool_start(&w);
   tool_move(&w, 0.003, 0.002, HALF - 0.01, 0.0, 200);
   CHECK_NEAR(w.state.wrench.force[2], 10.0, 1e-6);
   REQUIRE(hap_session_lock(w.session) == HAP_OK);
@@ -224,7 +224,7 @@ TEST(an_edge_is_a_way_round)
     world_begin(&w, HAP_MODEL_CONTACT, 60.0);
     (void)sheet_add(&s, &w, (sheet_kind)kind, 0.001);
     tool_go(&w, 0.03, 0.0, HALF + 0.002, 0.0);
-    REQUIRE(tool_start(&w));
+    tool_start(&w);
     tool_move(&w, 0.03, 0.0, -0.007, 0.0, 200); /* 12 mm deep, and under the sheet */
     CHECK_NEAR(w.state.wrench.force[2], 12.0, 1e-6);
     tool_move(&w, 0.07, 0.0, -0.007, 0.0, 400);
@@ -252,7 +252,7 @@ static double slide_error(tool_world *w, double mu, double turn)
   tool_go(w, -0.02, 0.003, HALF + 0.001, 0.0);
   w->pose.quat_wxyz[0] = cos(0.5 * turn);
   w->pose.quat_wxyz[3] = sin(0.5 * turn);
-  CHECK(tool_start(w));
+  tool_start(w);
   tool_run(w, 100);
   for (int i = 0; i < 1000; ++i) {
     double down = i < 100 ? 0.003 * i / 100.0 : 0.003;
@@ -319,7 +319,7 @@ TEST(a_leaning_hull_feels_one_surface)
       block_add(&w, 0.05, -0.05);
     }
     tool_go(&w, 0.002, 0.0, HALF + 0.001, 0.0);
-    REQUIRE(tool_start(&w));
+    tool_start(&w);
     tool_move(&w, 0.002, 0.0, HALF - 0.002, 0.0, 100);
     tool_move(&w, 0.002, 0.0, HALF - 0.002, 0.02, 100);
     tool_run(&w, 100);
@@ -338,7 +338,7 @@ TEST(blocks_that_are_apart_push_each)
   block_add(&w, -0.052, -0.05);
   block_add(&w, 0.052, -0.05);
   tool_go(&w, 0.0, 0.0, HALF + 0.001, 0.0);
-  REQUIRE(tool_start(&w));
+  tool_start(&w);
   tool_move(&w, 0.0, 0.0, HALF - 0.002, 0.0, 100);
   CHECK_NEAR(w.state.wrench.force[2], 4.0, 1e-6);
   tool_end(&w);
@@ -351,7 +351,7 @@ TEST(both_sides_of_an_inner_corner_push)
   block_add(&w, 0.0, -0.05);
   block_add(&w, -0.05, 0.05); /* a wall at x = 0 that stands on it */
   tool_go(&w, HALF + 0.001, 0.0, HALF + 0.001, 0.0);
-  REQUIRE(tool_start(&w));
+  tool_start(&w);
   tool_run(&w, 100);
   for (int i = 1; i <= 200; ++i) {
     tool_go(&w, HALF + 0.001 - 5e-5 * i, 0.0, HALF + 0.001 - 3e-5 * i, 0.0);

@@ -284,7 +284,7 @@ static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
   for (int k = 0; k < 6; ++k) {
     box[k] = pointer->pose.position[k / 2] + (k % 2 == 0 ? -far : far);
   }
-  uint32_t count = hapi_mesh_near(nearby, hit->geom, box, nearby->range.number);
+  uint32_t count = hapi_triangles_near(nearby, hit->geom, box, nearby->range.number);
   for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
     uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i]);
     if (geom != HAPI_NONE && body != NULL) {
@@ -319,7 +319,7 @@ static void take_tools(hapi_nearby *nearby, uint32_t hit_count)
     if (body != NULL) {
       nearby->slots.bodies[known_body(nearby, known)->slot].linked = true;
     }
-    if (dGeomGetClass(hit->geom) == dTriMeshClass) {
+    if (hapi_geom_has_triangles(hit->geom)) {
       add_tool_mesh(nearby, hit);
     } else {
       add_tool_pair(nearby, hit, take_geom(nearby, hit->geom));

@@ -178,7 +178,8 @@ static void search_mesh(tool_search *s)
     box[2 * k] = s->pose.position[k] - far;
     box[2 * k + 1] = s->pose.position[k] + far;
   }
-  uint32_t count = hapi_mesh_near(s->nearby, s->at->geom, box, s->nearby->cycle->model_number + 1);
+  uint32_t count =
+      hapi_triangles_near(s->nearby, s->at->geom, box, s->nearby->cycle->model_number + 1);
   s->nearby->counts.dropped += count == HAPI_NEAR_TRIANGLES;
   s->triangles = count < HAPI_NEAR_TRIANGLES ? count : 0;
 }
@@ -234,7 +235,7 @@ static void search_begin(tool_search *s, hapi_nearby *nearby, const hapi_tool_at
                  hapi_neighbors_spin(at->geom, pointer->extent);
   s->margin = fmin(at->reach, hapi_neighbors_reach(speed, at->horizon));
   int kind = dGeomGetClass(at->geom);
-  if (kind == dTriMeshClass) {
+  if (hapi_geom_has_triangles(at->geom)) {
     search_mesh(s);
   } else if (kind == dConvexClass) {
     s->has_shape = hapi_hull_of_convex(nearby, at->geom, &s->other.shape, &s->other.pose);
@@ -242,8 +243,8 @@ static void search_begin(tool_search *s, hapi_nearby *nearby, const hapi_tool_at
     s->has_shape = hapi_shape_of_geom(at->geom, &s->other.shape, &s->other.pose);
     if (!s->has_shape) {
       hapi_say_once(nearby->cycle, &nearby->tools.said_not_touched,
-                    "a pointer that is a hull does not touch heightfields and geoms of user-made "
-                    "classes; take a trimesh there");
+                    "a pointer that is a hull does not touch geoms of user-made classes; take a "
+                    "trimesh there");
     }
   }
 }

@@ -48,7 +48,7 @@ typedef struct hapi_tool_search {
   uint32_t *hits; /* of the parts */
   uint32_t hit_capacity;
   hapi_geom_names names;
-  bool said_not_touched; /* of a heightfield by a hull, once a session */
+  bool said_not_touched; /* of a user-made class by a hull, once a session */
 } hapi_tool_search;
 
 /* m: how deep the pointer was in a geom, at the loop's newest message. */
