@@ -534,7 +534,7 @@ static void hits_hide(hapi_nearby *nearby, uint32_t count)
   }
 }
 
-/* What is left where geoms adjoin under a hull; model CONTACT finds the points in another thread. */
+/* What is left where geoms adjoin under a hull. For model CONTACT another thread finds points. */
 static uint32_t hits_join(hapi_nearby *nearby, uint32_t count)
 {
   hapi_hit *hits = nearby->neighbors.hits;

@@ -7,8 +7,8 @@
 #include "base/assert.h"
 #include "proximity/constrained_ball.h"
 
-/* Where a hull may be beside a geom is, for its orientation, all space but a convex region: the hull
- * is a point there, and follows the constrained ball's ways. The radius is any; it only keeps what
+/* Where a hull may be beside a geom is, for its orientation, all space but a convex region: the
+ * hull is a point there, and follows the constrained ball's ways. The radius is any; it only keeps what
  * is a little inside from being taken for deep. */
 #define RADIUS 1.0
 
@@ -69,8 +69,8 @@ static double spots_way(const hapi_tool_spots *found, double out[3])
   return hapi_v3_norm(out);
 }
 
-/* The found way leads to the told side, by all points: the hull has moved since it was told, but not
- * past it. */
+/* The found way leads to the told side, by all points: the hull has moved since it was told, but
+ * not past it. */
 static bool is_told_side(const hapi_tool_seek *seek, const told_place *told,
                          const hapi_tool_spots *found, const double way[3], double length)
 {
