@@ -3,6 +3,7 @@
 #include "solver/contact_solver.h"
 
 #include <stdbool.h>
+#include <string.h>
 
 #include "base/assert.h"
 #include "base/vec.h"
@@ -11,14 +12,15 @@
  * go in circles, sweeps lead out. */
 #define DIRECT_ROUNDS 8
 #define DEAR_RUNS 32u
-#define SWEEPS_ALONE 4000u /* row updates, or two sweeps, where a direct solve is too dear */
+#define CALM_UPDATES 4000u /* row updates of hapi_solver_sweep_on, and two sweeps */
 
-/* After so many runs in vain direct solves rest. With 8000 row updates for sweeps meanwhile a row
- * of 20 to 30 cubes that is pushed costs half of what the vain ones do, and its force is as near;
- * with 4000 it is up to twice as far off. */
+/* A direct solve that costs more than this is in vain when it leads to nothing better. After so
+ * many such runs direct solves rest, and all of the budget is for sweeps; the rest doubles each
+ * time that the next one is in vain as well. */
+#define VAIN_COST 4000u /* row updates */
 #define VAIN_RUNS 4u
 #define VAIN_REST 16u
-#define VAIN_ALONE 8000u
+#define VAIN_REST_MOST 256u
 
 /* ---- preparation ---- */
 
@@ -330,6 +332,91 @@ static double rows_sweep(hapi_solver *solver)
                                  : sweep_back(solver);
 }
 
+/* ---- sweeps that look ahead ---- */
+
+/* Many bodies in touch hand an impulse on by one or two of them a sweep, so plain sweeps take as
+ * many as the square of a row's length. Conjugate directions take about as many as its length: what
+ * a sweep changes is taken as the negative gradient of what the rows minimise, and the next sweep
+ * begins farther along the way of the last ones,
+ *
+ *   d_k = sweep(x_k) - x_k,   s = |d_k|^2 / |d_k-1|^2
+ *   s <= 1:  p_k = s p_k-1 + d_k,   x_k+1 = x_k + d_k + s p_k-1
+ *   s > 1:   p_k = d_k,             x_k+1 = x_k + d_k
+ *
+ * with |d| in the energy of each row. This is the nonsmooth nonlinear conjugate gradient method of
+ * Silcowitz-Hansen, Niebe and Erleben (The Visual Computer 26, 2010). Velocities are linear in the
+ * impulses and go along. Every way ends with a sweep, so the impulses end within their bounds. */
+typedef struct sweep_way {
+  double *x;       /* by row: impulse at the begin of the sweep */
+  double *p;       /* by row */
+  double *d;       /* by row */
+  double (*vx)[6]; /* by body: the same of the velocities */
+  double (*vp)[6];
+  double size2; /* J, of the last d; 0: none yet */
+  bool begun;
+} sweep_way;
+
+/* The memory is that of direct solves: a way ends where one of them is made. */
+static bool way_place(const hapi_solver *solver, sweep_way *out)
+{
+  size_t rows = solver->row_count;
+  size_t bodies = solver->body_count;
+  out->begun = false;
+  out->x = solver->work;
+  if (solver->work_count < 3 * rows + 12 * bodies) {
+    return false;
+  }
+  out->p = out->x + rows;
+  out->d = out->p + rows;
+  out->vx = (double(*)[6])(out->d + rows);
+  out->vp = out->vx + bodies;
+  return true;
+}
+
+/* In row updates. */
+static uint32_t way_cost(uint32_t rows)
+{
+  return rows / 4;
+}
+
+static void way_begin(const hapi_solver *solver, sweep_way *way)
+{
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    way->x[i] = solver->rows[i].impulse;
+  }
+  memcpy(way->vx, solver->v, solver->body_count * sizeof *solver->v);
+  way->size2 = 0.0;
+  way->begun = true;
+}
+
+/* From the end of one sweep to the begin of the next one. */
+static void way_go_on(hapi_solver *solver, sweep_way *way)
+{
+  double size2 = 0.0;
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    const hapi_row *row = &solver->rows[i];
+    double d = row->inverse != 0.0 ? row->impulse - way->x[i] : 0.0;
+    way->d[i] = d;
+    size2 += d * d * row->response;
+  }
+  bool ahead = size2 <= way->size2 && way->size2 > 0.0;
+  double share = ahead ? size2 / way->size2 : 0.0;
+  for (uint32_t i = 0; i < solver->row_count; ++i) {
+    double more = ahead ? share * way->p[i] : 0.0;
+    way->x[i] = solver->rows[i].impulse += more;
+    way->p[i] = more + way->d[i];
+  }
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    for (int k = 0; k < 6; ++k) {
+      double d = solver->v[i][k] - way->vx[i][k];
+      double more = ahead ? share * way->vp[i][k] : 0.0;
+      way->vx[i][k] = solver->v[i][k] += more;
+      way->vp[i][k] = more + d;
+    }
+  }
+  way->size2 = size2;
+}
+
 /* Non-finite velocities must not pass for a solution. */
 static void check_finite(hapi_solver *solver)
 {
@@ -347,34 +434,25 @@ static void check_finite(hapi_solver *solver)
   }
 }
 
-/* What is left for sweeps where direct solves are left out: more of them gain little. */
-static uint64_t sweeps_alone(uint32_t rows, uint64_t left, uint32_t updates)
-{
-  uint64_t enough = 2 * (uint64_t)rows > updates ? 2 * (uint64_t)rows : updates;
-  return left < enough ? left : enough;
-}
-
 /* Too dear for the whole budget, not for what was left of it. */
 static void note_dear(hapi_solver *solver, uint64_t left, uint32_t rows)
 {
   if (left + 3 * (uint64_t)rows >= solver->update_budget) {
     solver->dear_rows = rows;
-    solver->dear_runs = 0;
-    solver->dear_updates = SWEEPS_ALONE;
+    solver->dear_runs = DEAR_RUNS;
   }
 }
 
-/* Direct solves that led to nothing better, one of them as dear as all sweeps where they are too
- * dear. */
+/* A costly direct solve that led to nothing better. */
 static void note_vain(hapi_solver *solver, uint32_t dearest)
 {
-  bool vain = dearest > SWEEPS_ALONE && solver->direct_solves == 0;
+  bool vain = dearest > VAIN_COST && solver->direct_solves == 0;
   solver->vain_runs = vain ? solver->vain_runs + 1 : 0;
   if (solver->vain_runs >= VAIN_RUNS && solver->dear_rows == 0) {
+    uint32_t again = solver->vain_runs - VAIN_RUNS;
+    uint32_t rest = again < 8 ? VAIN_REST << again : VAIN_REST_MOST;
     solver->dear_rows = solver->row_count;
-    solver->dear_runs = DEAR_RUNS - VAIN_REST;
-    solver->dear_updates = VAIN_ALONE;
-    solver->vain_runs = VAIN_RUNS - 1;
+    solver->dear_runs = rest < VAIN_REST_MOST ? rest : VAIN_REST_MOST;
   }
 }
 
@@ -384,7 +462,7 @@ static bool stays_dear(hapi_solver *solver)
 {
   bool alike =
       solver->dear_rows > 0 && 10 * (uint64_t)solver->row_count >= 9 * (uint64_t)solver->dear_rows;
-  if (!alike || ++solver->dear_runs >= DEAR_RUNS) {
+  if (!alike || --solver->dear_runs == 0) {
     solver->dear_rows = 0;
     return false;
   }
@@ -393,7 +471,7 @@ static bool stays_dear(hapi_solver *solver)
 
 void hapi_solver_sweep_on(hapi_solver *solver)
 {
-  for (uint32_t i = 0; i < 2 + SWEEPS_ALONE / solver->row_count; ++i) {
+  for (uint32_t i = 0; i < 2 + CALM_UPDATES / solver->row_count; ++i) {
     solver->residual = rows_sweep(solver);
   }
   check_finite(solver);
@@ -431,7 +509,8 @@ void hapi_solver_run(hapi_solver *solver)
   bool dear = may && stays_dear(solver);
   bool direct = may && !dear;
   uint32_t dearest = 0;
-  left = dear ? sweeps_alone(rows, left, solver->dear_updates) : left;
+  sweep_way way = {0};
+  bool ahead = way_place(solver, &way);
   for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
     hapi_row_ready(solver, i);
   }
@@ -441,6 +520,14 @@ void hapi_solver_run(hapi_solver *solver)
   }
   for (uint32_t rounds = 0; rows > 0; ++rounds) {
     do {
+      if (ahead && rounds > 0) {
+        left -= way_cost(rows) < left ? way_cost(rows) : left;
+        if (way.begun) {
+          way_go_on(solver, &way);
+        } else {
+          way_begin(solver, &way);
+        }
+      }
       solver->residual = rows_sweep(solver);
       left -= left < rows ? left : rows;
     } while (solver->sweeps < 2 && !(solver->residual < solver->tolerance));
@@ -455,6 +542,7 @@ void hapi_solver_run(hapi_solver *solver)
         (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
       uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
       left -= spent;
+      way.begun = false;
       dearest = spent > dearest ? spent : dearest;
       direct = !solver->too_dear; /* now, and so in the next round */
       if (direct && solver->direct_residual < solver->tolerance) {
@@ -463,7 +551,6 @@ void hapi_solver_run(hapi_solver *solver)
       }
       if (!direct) {
         note_dear(solver, left, rows);
-        left = sweeps_alone(rows, left, SWEEPS_ALONE);
       }
     }
   }

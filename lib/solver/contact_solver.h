@@ -43,11 +43,10 @@ typedef struct hapi_solver {
   bool ready; /* in: every row is (hapi_row_ready), or the rows are those of the last run, with
                          its impulses in v, but for hapi_row_retarget */
   bool apart; /* in: all rows are single, and no two have a body in common: one sweep solves them */
-  uint32_t dear_rows;    /* inner: direct solves were too dear for so many rows; 0: they were not */
-  uint32_t dear_runs;    /* inner: since then */
-  uint32_t dear_updates; /* inner: what sweeps have meanwhile */
-  uint32_t vain_runs;    /* inner: one after the other, in which no direct solve was any better */
-  bool too_dear;         /* inner: an island was too large or too dear for the budget */
+  uint32_t dear_rows; /* inner: direct solves were too dear for so many rows; 0: they were not */
+  uint32_t dear_runs; /* inner: for so many runs more */
+  uint32_t vain_runs; /* inner: one after the other, in which no direct solve was any better */
+  bool too_dear;      /* inner: an island was too large or too dear for the budget */
   double direct_residual; /* inner: the largest correction due after a direct run, m/s */
   uint32_t sweeps;        /* out */
   uint32_t direct_solves; /* out: that were accepted */
