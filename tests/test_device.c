@@ -13,27 +13,18 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/number.h"
-#include "device/device.h"
 #include "plugins/common/arguments.h"
 #include "plugins/common/output.h"
 #include "plugins/common/timeline.h"
+#include "tests/fake_device.h"
 
-/* A device that counts its calls. */
-typedef struct counters {
-  int opens;
-  int zeros;
-  int closes;
-  bool zero_before_close;
-} counters;
-
-static counters seen;
-static hap_device_info told;
+static int opens;
 
 static hap_status open_gives; /* to "quiet", "full" and "none" */
 
-static hap_status fake_open(const char *args, void **self, hap_detail *detail)
+static hap_status counted_open(const char *args, void **self, hap_detail *detail)
 {
-  ++seen.opens;
+  ++opens;
   if (strcmp(args, "full") == 0) {
     memset(detail->text, 'x', sizeof detail->text); /* no end */
   }
@@ -43,66 +34,17 @@ static hap_status fake_open(const char *args, void **self, hap_detail *detail)
   if (strcmp(args, "fail") == 0) {
     return hapi_fail(detail, HAP_ERROR_DEVICE, "fake: no");
   }
-  *self = &seen;
+  *self = &fakes[0];
   return HAP_OK;
 }
 
-static void fake_describe(void *self, hap_device_info *out)
+static hap_device_ops counted_ops(void)
 {
-  (void)self;
-  *out = told;
-}
-
-static hap_status fake_start(void *self)
-{
-  (void)self;
-  return HAP_OK;
-}
-
-static hap_status fake_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                            uint32_t *buttons)
-{
-  (void)self;
-  (void)time_ns;
-  memset(pose, 0, sizeof *pose);
-  memset(twist, 0, sizeof *twist);
-  *buttons = 0;
-  return HAP_OK;
-}
-
-static hap_status fake_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
-{
-  (void)self;
-  *reached = *wanted;
-  return HAP_OK;
-}
-
-static void fake_zero(void *self)
-{
-  counters *c = self;
-  ++c->zeros;
-}
-
-static void fake_stop(void *self)
-{
-  (void)self;
-}
-
-static void fake_close(void *self)
-{
-  counters *c = self;
-  ++c->closes;
-  c->zero_before_close = c->zeros > 0;
-}
-
-static hap_device_ops fake_ops(void)
-{
-  hap_device_ops ops = {HAP_DEVICE_ABI, sizeof ops,    "fake",     "counts",  HAP_PACING_HOST,
-                        fake_open,      fake_describe, fake_start, fake_read, fake_write,
-                        fake_zero,      fake_stop,     fake_close};
-  memset(&seen, 0, sizeof seen);
-  memset(&told, 0, sizeof told);
-  told.dof = 3;
+  hap_device_ops ops = fake_ops;
+  ops.open = counted_open;
+  opens = 0;
+  fakes_opened = 0;
+  fake_next()->info.max_force = 0.0;
   return ops;
 }
 
@@ -137,7 +79,7 @@ TEST(unknown_name_lists_the_known)
 {
   static const char *const specs[] = {"virtua", "virtuall:", "", ":", "REPLAY:x.csv"};
   for (size_t i = 0; i < sizeof specs / sizeof specs[0]; ++i) {
-    hap_device *device = (hap_device *)&seen;
+    hap_device *device = (hap_device *)&fakes[0];
     hap_detail detail;
     CHECK(hap_device_open(specs[i], &device, &detail) == HAP_ERROR_NOT_FOUND);
     CHECK(device == NULL);
@@ -148,7 +90,7 @@ TEST(unknown_name_lists_the_known)
 
 TEST(null_is_refused)
 {
-  hap_device *device = (hap_device *)&seen;
+  hap_device *device = (hap_device *)&fakes[0];
   hap_device_info info;
   CHECK(hap_device_open(NULL, &device, NULL) == HAP_ERROR_ARGUMENT && device == NULL);
   CHECK(hap_device_open("virtual", NULL, NULL) == HAP_ERROR_ARGUMENT);
@@ -176,7 +118,7 @@ TEST(abi_comes_first)
 TEST(older_tables_without_optional_operations_are_served)
 {
   hap_device *device = NULL;
-  hap_device_ops ops = fake_ops();
+  hap_device_ops ops = counted_ops();
   ops.size = (uint32_t)offsetof(hap_device_ops, held);
   REQUIRE(open_fake(&ops, &device) == HAP_OK);
   hap_device_close(device);
@@ -185,22 +127,22 @@ TEST(older_tables_without_optional_operations_are_served)
 TEST(bad_tables_are_refused)
 {
   hap_device *device = NULL;
-  hap_device_ops ops = fake_ops();
+  hap_device_ops ops = counted_ops();
   ops.name = "Fake";
   CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE);
-  ops = fake_ops();
+  ops = counted_ops();
   ops.name = NULL;
   CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE);
-  ops = fake_ops();
+  ops = counted_ops();
   ops.pacing = 3;
   CHECK(open_fake(&ops, &device) == HAP_ERROR_UNSUPPORTED);
   for (size_t at = offsetof(hap_device_ops, open); at <= offsetof(hap_device_ops, close);
        at += sizeof ops.open) {
-    ops = fake_ops();
+    ops = counted_ops();
     memset((char *)&ops + at, 0, sizeof ops.open);
     CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE);
   }
-  CHECK(seen.opens == 0);
+  CHECK(opens == 0);
 }
 
 /* A status that is none, no text, no self: it is said all the same. */
@@ -216,12 +158,12 @@ TEST(what_open_does_wrong_is_said)
                {(hap_status)INT32_MIN, "full", HAP_ERROR_DEVICE, "xxxxxxx"},
                {HAP_OK, "none", HAP_ERROR_DEVICE, "gave no self"}};
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-    hap_device_ops ops = fake_ops();
+    hap_device_ops ops = counted_ops();
     hap_device *device = NULL;
     hap_detail detail = {"of before"};
     open_gives = cases[i].gives;
     CHECK(hapi_device_open_ops(&ops, cases[i].args, &device, &detail) == cases[i].status);
-    CHECK(device == NULL && strstr(detail.text, cases[i].said) != NULL && seen.closes == 0);
+    CHECK(device == NULL && strstr(detail.text, cases[i].said) != NULL && fakes[0].closes == 0);
     CHECK(strstr(detail.text, "of before") == NULL);
     CHECK(memchr(detail.text, '\0', sizeof detail.text) != NULL);
   }
@@ -230,34 +172,34 @@ TEST(what_open_does_wrong_is_said)
 TEST(bad_info_closes_again)
 {
   hap_device *device = NULL;
-  hap_device_ops ops = fake_ops();
-  told.dof = 4;
-  CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE && seen.closes == 1);
+  hap_device_ops ops = counted_ops();
+  fakes[0].info.dof = 4;
+  CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE && fakes[0].closes == 1);
   double wrong[3] = {(double)NAN, (double)INFINITY, -1.0};
   for (int i = 0; i < 3; ++i) {
-    ops = fake_ops();
-    told.max_force = wrong[i];
-    CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE && seen.closes == 1);
-    ops = fake_ops();
-    told.quantum = wrong[i];
-    CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE && seen.closes == 1);
+    ops = counted_ops();
+    fakes[0].info.max_force = wrong[i];
+    CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE && fakes[0].closes == 1);
+    ops = counted_ops();
+    fakes[0].info.quantum = wrong[i];
+    CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE && fakes[0].closes == 1);
   }
 }
 
 TEST(failed_open_keeps_its_text)
 {
-  hap_device_ops ops = fake_ops();
+  hap_device_ops ops = counted_ops();
   hap_device *device = NULL;
   hap_detail detail;
   CHECK(hapi_device_open_ops(&ops, "fail", &device, &detail) == HAP_ERROR_DEVICE);
-  CHECK(device == NULL && strcmp(detail.text, "fake: no") == 0 && seen.closes == 0);
+  CHECK(device == NULL && strcmp(detail.text, "fake: no") == 0 && fakes[0].closes == 0);
 }
 
 TEST(info_has_a_name_and_fits_any_size)
 {
   hap_device *device = NULL;
-  hap_device_ops ops = fake_ops();
-  told.max_force = 7.5;
+  hap_device_ops ops = counted_ops();
+  fakes[0].info.max_force = 7.5;
   REQUIRE(open_fake(&ops, &device) == HAP_OK);
   struct {
     hap_device_info info;
@@ -276,37 +218,37 @@ TEST(info_has_a_name_and_fits_any_size)
   CHECK(((unsigned char *)&small.max_force)[0] == 0xff); /* behind the size: not touched */
   hap_device_close(device);
 
-  ops = fake_ops();
-  memset(told.name, 'n', sizeof told.name); /* not terminated */
+  ops = counted_ops();
+  memset(fakes[0].info.name, 'n', sizeof fakes[0].info.name); /* not terminated */
   REQUIRE(open_fake(&ops, &device) == HAP_OK);
-  CHECK(strlen(hapi_device_info(device)->name) == sizeof told.name - 1);
+  CHECK(strlen(hapi_device_info(device)->name) == sizeof fakes[0].info.name - 1);
   hap_device_close(device);
 }
 
 TEST(close_zeroes_first)
 {
   hap_device *device = NULL;
-  hap_device_ops ops = fake_ops();
+  hap_device_ops ops = counted_ops();
   REQUIRE(open_fake(&ops, &device) == HAP_OK);
-  CHECK(hapi_device_ops(device) == &ops && hapi_device_self(device) == &seen);
+  CHECK(hapi_device_ops(device) == &ops && hapi_device_self(device) == &fakes[0]);
   hap_device_close(device);
-  CHECK(seen.zeros == 1 && seen.closes == 1 && seen.zero_before_close);
+  CHECK(fakes[0].zeros == 1 && fakes[0].closes == 1 && fakes[0].wrong == 0);
 }
 
 TEST(one_device_serves_one_pointer)
 {
   hap_device *device = NULL;
-  hap_device_ops ops = fake_ops();
+  hap_device_ops ops = counted_ops();
   REQUIRE(open_fake(&ops, &device) == HAP_OK);
   CHECK(hapi_device_claim(device));
   CHECK(!hapi_device_claim(device));
   hapi_device_release(device);
   CHECK(hapi_device_claim(device));
   hap_device_close(device); /* early: zero now, gone when the pointer lets go */
-  CHECK(seen.zeros == 1 && seen.closes == 0);
+  CHECK(fakes[0].zeros == 1 && fakes[0].closes == 0);
   CHECK(!hapi_device_claim(device));
   hapi_device_release(device);
-  CHECK(seen.closes == 1);
+  CHECK(fakes[0].closes == 1);
 }
 
 /* A heap that fails at the nth allocation and counts what is not given back. */
@@ -550,7 +492,7 @@ static char logged[2048];
 
 static void keep_log(hap_log_level level, const char *text, void *user)
 {
-  CHECK(level == HAP_LOG_WARNING && user == &seen);
+  CHECK(level == HAP_LOG_WARNING && user == &fakes[0]);
   snprintf(logged, sizeof logged, "%s", text);
 }
 
@@ -567,7 +509,7 @@ TEST(hooks_are_used)
   hap_hooks log_only;
   hap_hooks_init(&log_only, sizeof log_only);
   log_only.log = keep_log;
-  log_only.user = &seen;
+  log_only.user = &fakes[0];
   REQUIRE(hap_hooks_set(&log_only) == HAP_OK);
   hapi_log(HAP_LOG_WARNING, "%s %d", "gap", 3);
   CHECK(strcmp(logged, "gap 3") == 0);

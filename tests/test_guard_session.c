@@ -9,146 +9,53 @@
 #include <signal.h>
 #include <stdatomic.h>
 
-#include <hapode/device_impl.h>
-
-#include "base/vec.h"
-#include "device/device.h"
 #include "device/emergency.h"
+#include "tests/fake_device.h"
 #include "tests/stage.h"
 
-/* ---- a device that stands 3 mm deep in the cube and keeps book ---- */
+static atomic_int alarm_in_write; /* the emergency comes while a force is being written */
 
-typedef struct booked {
-  atomic_int fail_read;
-  atomic_int fail_write;
-  atomic_int bad_pose;
-  atomic_int alarm_in_write; /* the emergency comes while a force is being written */
-  atomic_int pushing;        /* the device holds a force */
-  atomic_int zeros;          /* calls of zero */
-  atomic_int forces;         /* writes that were not zero */
-  atomic_int stops;
-  atomic_int steep; /* writes that changed the force by more than its slew limit, 5 N a tick */
-  double held;      /* N */
-} booked;
-
-static booked device_book;
-
-static hap_status booked_open(const char *args, void **self, hap_detail *detail)
+static void alarm_push(fake_device *d, const hap_wrench *wanted, hap_wrench *reached)
 {
-  (void)args;
-  (void)detail;
-  *self = &device_book;
-  return HAP_OK;
-}
-
-static void booked_describe(void *self, hap_device_info *out)
-{
-  (void)self;
-  out->dof = 3;
-  out->max_force = 10.0;
-}
-
-static hap_status booked_start(void *self)
-{
-  (void)self;
-  return HAP_OK;
-}
-
-static hap_status booked_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                              uint32_t *buttons)
-{
-  booked *d = self;
-  (void)time_ns;
-  memset(twist, 0, sizeof *twist);
-  *buttons = 0;
-  *pose = (hap_pose){{-0.057, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  if (atomic_load(&d->bad_pose) != 0) {
-    pose->position[2] = (double)NAN;
-  }
-  return atomic_load(&d->fail_read) != 0 ? HAP_ERROR_DEVICE : HAP_OK;
-}
-
-static hap_status booked_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
-{
-  booked *d = self;
-  double force = hapi_v3_norm(wanted->force);
-  if (atomic_load(&d->fail_write) != 0) {
-    return HAP_ERROR_DEVICE;
-  }
-  if (atomic_exchange(&d->alarm_in_write, 0) != 0) {
+  (void)d;
+  (void)wanted;
+  (void)reached;
+  if (atomic_exchange(&alarm_in_write, 0) != 0) {
     hap_emergency_zero();
   }
-  atomic_fetch_add(&d->steep, !(fabs(force - d->held) <= 5.0 * (1.0 + 1e-9)));
-  d->held = force;
-  atomic_fetch_add(&d->forces, force != 0.0);
-  atomic_store(&d->pushing, force != 0.0);
-  *reached = *wanted;
-  return HAP_OK;
 }
-
-static void booked_zero(void *self)
-{
-  booked *d = self;
-  atomic_fetch_add(&d->zeros, 1);
-  atomic_store(&d->pushing, 0);
-}
-
-static void booked_stop(void *self)
-{
-  booked *d = self;
-  atomic_fetch_add(&d->stops, 1);
-}
-
-static void booked_close(void *self)
-{
-  (void)self;
-}
-
-static const hap_device_ops booked_ops = {
-    .abi = HAP_DEVICE_ABI,
-    .size = sizeof(hap_device_ops),
-    .name = "booked",
-    .help = "for tests",
-    .pacing = HAP_PACING_VIRTUAL,
-    .open = booked_open,
-    .describe = booked_describe,
-    .start = booked_start,
-    .read = booked_read,
-    .write = booked_write,
-    .zero = booked_zero,
-    .stop = booked_stop,
-    .close = booked_close,
-};
 
 static hap_pointer_id hand;
 
 /* The cube stands still whatever pushes it. */
-static bool start_with_device(stage *s, hap_device **out)
+static void stage_add_device(stage *s, hap_device **out)
 {
-  hap_pointer_def def;
-  hap_detail detail;
-  memset(&device_book, 0, sizeof device_book);
+  fakes_opened = 0;
+  fake_device *d = fake_next();
+  d->info.max_force = 10.0;
+  d->push = alarm_push;
+  *out = fake_device_open(HAP_PACING_VIRTUAL);
   dBodySetKinematic(s->cube);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hap_pointer_def def;
   hap_pointer_def_init(&def, sizeof def);
-  bool opened = hapi_device_open_ops(&booked_ops, "", out, &detail) == HAP_OK;
   def.device = *out;
-  return opened && stage_create(s) == HAP_OK &&
-         hap_pointer_add(s->session, &def, &hand) == HAP_OK &&
-         hap_session_start(s->session) == HAP_OK;
+  REQUIRE(hap_pointer_add(s->session, &def, &hand) == HAP_OK);
 }
 
-/* NULL when it does not start. */
 static stage *stage_begin(hap_drive drive, hap_device **out)
 {
   stage *s = stage_new(drive);
-  return start_with_device(s, out) ? s : NULL;
+  stage_add_device(s, out);
+  session_run(s->session);
+  return s;
 }
 
 static void stage_finish(stage *s, hap_device *device)
 {
   stage_end(s);
   hap_device_close(device);
-  CHECK(atomic_load(&device_book.pushing) == 0);
+  CHECK(atomic_load(&fakes[0].pushing) == 0);
 }
 
 /* Lets a session run until the condition holds; false: it did not for long. */
@@ -170,7 +77,7 @@ static bool run_until(stage *s, bool (*condition)(stage *s))
 static bool hand_pushes(stage *s)
 {
   (void)s;
-  return atomic_load(&device_book.pushing) != 0;
+  return atomic_load(&fakes[0].pushing) != 0;
 }
 
 static bool has_fault(stage *s)
@@ -189,18 +96,17 @@ static const hap_drive drives[] = {HAP_DRIVE_LOCKSTEP, HAP_DRIVE_THREADS};
 
 TEST(a_device_that_fails_is_zeroed_at_once)
 {
-  atomic_int *const causes[] = {&device_book.fail_read, &device_book.fail_write};
+  atomic_int *const causes[] = {&fakes[0].fail_read, &fakes[0].fail_write};
   for (int i = 0; i < 2; ++i) {
     hap_device *device;
     stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
-    REQUIRE(s != NULL);
     CHECK(hap_session_advance(s->session, 100) == HAP_OK && hand_pushes(s));
-    int forces = atomic_load(&device_book.forces);
+    int forces = atomic_load(&fakes[0].forces);
     atomic_store(causes[i], 1);
     CHECK(hap_session_advance(s->session, 1) == HAP_FAULTED);
-    CHECK(atomic_load(&device_book.zeros) >= 1 && !hand_pushes(s));
+    CHECK(atomic_load(&fakes[0].zeros) >= 1 && !hand_pushes(s));
     CHECK(hap_session_advance(s->session, 20) == HAP_FAULTED);
-    CHECK(atomic_load(&device_book.forces) == forces); /* none since */
+    CHECK(atomic_load(&fakes[0].forces) == forces); /* none since */
     CHECK(stats_of(s).faults.pointer == hand.v && text_has(detail_of(s), "pointer 1: the device"));
     CHECK(hap_pointer_remove(s->session, hand) == HAP_OK);
     CHECK(hap_session_advance(s->session, 1) == HAP_FAULTED);
@@ -213,15 +119,14 @@ TEST(other_faults_ramp_to_zero_and_a_reset_ramps_in)
 {
   hap_device *device;
   stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
-  REQUIRE(s != NULL);
   CHECK(hap_session_advance(s->session, 100) == HAP_OK);
   hap_pointer_state state;
-  atomic_store(&device_book.bad_pose, 1);
+  atomic_store(&fakes[0].bad_pose, 1);
   CHECK(hap_session_advance(s->session, 3) == HAP_FAULTED && !hand_pushes(s));
-  CHECK(atomic_load(&device_book.zeros) == 0); /* by writes alone */
+  CHECK(atomic_load(&fakes[0].zeros) == 0); /* by writes alone */
   CHECK(hap_pointer_get(s->session, hand, &state, sizeof state) == HAP_OK);
   CHECK(state.guard == HAP_GUARD_FAULT && hapi_v3_norm(state.wrench.force) == 0.0);
-  atomic_store(&device_book.bad_pose, 0);
+  atomic_store(&fakes[0].bad_pose, 0);
   CHECK(hap_session_reset_fault(s->session) == HAP_OK);
   double before = 0.0;
   for (int i = 0; i < 25; ++i) {
@@ -233,7 +138,7 @@ TEST(other_faults_ramp_to_zero_and_a_reset_ramps_in)
     before = force;
   }
   CHECK_NEAR(before, 3.0, 1e-6);
-  CHECK(atomic_load(&device_book.steep) == 0);
+  CHECK(atomic_load(&fakes[0].steep) == 0);
   stage_finish(s, device);
 }
 
@@ -258,19 +163,18 @@ TEST(an_emergency_takes_all_force_until_the_reset)
   for (int d = 0; d < 2; ++d) {
     hap_device *device;
     stage *s = stage_begin(drives[d], &device);
-    REQUIRE(s != NULL);
     REQUIRE(run_until(s, hand_pushes));
     signal(SIGUSR1, on_signal);
     raise(SIGUSR1);
-    CHECK(atomic_load(&device_book.zeros) >= 1);
+    CHECK(atomic_load(&fakes[0].zeros) >= 1);
     REQUIRE(run_until(s, has_fault));
-    int forces = atomic_load(&device_book.forces);
+    int forces = atomic_load(&fakes[0].forces);
     uint64_t ticks = stats_of(s).loop.ticks;
     while (stats_of(s).loop.ticks < ticks + 20) {
       CHECK(!run_until(s, has_fault) || s->def.drive != HAP_DRIVE_LOCKSTEP ||
             hap_session_advance(s->session, 1) == HAP_FAULTED);
     }
-    CHECK(atomic_load(&device_book.forces) == forces && !hand_pushes(s));
+    CHECK(atomic_load(&fakes[0].forces) == forces && !hand_pushes(s));
     CHECK(stats_of(s).faults.fault == HAP_FAULT_EMERGENCY && stats_of(s).faults.pointer == 0);
     CHECK(text_has(detail_of(s), "hap_emergency_zero"));
     CHECK(hap_session_reset_fault(s->session) == HAP_OK);
@@ -283,14 +187,13 @@ TEST(a_force_that_is_written_during_an_emergency_does_not_stay)
 {
   hap_device *device;
   stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
-  REQUIRE(s != NULL);
   CHECK(hap_session_advance(s->session, 50) == HAP_OK && hand_pushes(s));
-  atomic_store(&device_book.alarm_in_write, 1);
+  atomic_store(&alarm_in_write, 1);
   CHECK(hap_session_advance(s->session, 1) >= HAP_OK);
   CHECK(!hand_pushes(s)); /* the write ended after the zero of the emergency */
-  int forces = atomic_load(&device_book.forces);
+  int forces = atomic_load(&fakes[0].forces);
   CHECK(hap_session_advance(s->session, 10) == HAP_FAULTED);
-  CHECK(atomic_load(&device_book.forces) == forces);
+  CHECK(atomic_load(&fakes[0].forces) == forces);
   stage_finish(s, device);
 }
 
@@ -299,43 +202,43 @@ TEST(an_emergency_before_the_start_or_after_the_end_reaches_nobody)
   hap_device *device;
   hap_emergency_zero();
   stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
-  REQUIRE(s != NULL);
   CHECK(hap_session_advance(s->session, 50) == HAP_OK && hand_pushes(s));
   CHECK(hap_session_stop(s->session) == HAP_OK);
-  int zeros = atomic_load(&device_book.zeros);
+  int zeros = atomic_load(&fakes[0].zeros);
   hap_emergency_zero();
-  CHECK(atomic_load(&device_book.zeros) == zeros); /* the device may be gone by now */
+  CHECK(atomic_load(&fakes[0].zeros) == zeros); /* the device may be gone by now */
   CHECK(hap_session_start(s->session) == HAP_OK);
   CHECK(hap_session_advance(s->session, 50) == HAP_OK && hand_pushes(s));
   CHECK(hap_pointer_remove(s->session, hand) == HAP_OK);
-  zeros = atomic_load(&device_book.zeros);
+  zeros = atomic_load(&fakes[0].zeros);
   hap_emergency_zero();
-  CHECK(atomic_load(&device_book.zeros) == zeros);
+  CHECK(atomic_load(&fakes[0].zeros) == zeros);
   stage_finish(s, device);
 }
 
 TEST(there_are_places_for_64_devices)
 {
   static int selves[HAPI_EMERGENCY_DEVICES + 1];
-  static booked books[2];
+  static fake_device books[2];
   int added = 0;
-  while (added <= HAPI_EMERGENCY_DEVICES && hapi_emergency_add(&booked_ops, &selves[added])) {
+  while (added <= HAPI_EMERGENCY_DEVICES && hapi_emergency_add(&fake_ops, &selves[added])) {
     ++added;
   }
   CHECK(added == HAPI_EMERGENCY_DEVICES);
   hap_device *device;
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
-  CHECK(!start_with_device(s, &device) && text_has(detail_of(s), "64 places"));
-  CHECK(atomic_load(&device_book.stops) == 1);
+  stage_add_device(s, &device);
+  CHECK(hap_session_start(s->session) < HAP_OK && text_has(detail_of(s), "64 places"));
+  CHECK(atomic_load(&fakes[0].stops) == 1);
   for (int i = 0; i < added; ++i) {
-    hapi_emergency_remove(&booked_ops, &selves[i]);
+    hapi_emergency_remove(&fake_ops, &selves[i]);
   }
   stage_finish(s, device);
-  CHECK(hapi_emergency_add(&booked_ops, &books[0]) && hapi_emergency_add(&booked_ops, &books[1]));
-  hapi_emergency_remove(&booked_ops, &books[0]);
+  CHECK(hapi_emergency_add(&fake_ops, &books[0]) && hapi_emergency_add(&fake_ops, &books[1]));
+  hapi_emergency_remove(&fake_ops, &books[0]);
   hap_emergency_zero();
   CHECK(atomic_load(&books[0].zeros) == 0 && atomic_load(&books[1].zeros) == 1);
-  hapi_emergency_remove(&booked_ops, &books[1]);
+  hapi_emergency_remove(&fake_ops, &books[1]);
 }
 
 static atomic_int alarm_goes_on;
@@ -355,9 +258,9 @@ TEST(devices_come_and_go_under_emergencies)
   atomic_store(&alarm_goes_on, 1);
   REQUIRE(pthread_create(&thread, NULL, alarm_ring, NULL) == 0);
   for (int i = 0; i < 2000; ++i) {
-    booked *fresh = calloc(1, sizeof *fresh);
-    CHECK(hapi_emergency_add(&booked_ops, fresh));
-    hapi_emergency_remove(&booked_ops, fresh);
+    fake_device *fresh = calloc(1, sizeof *fresh);
+    CHECK(hapi_emergency_add(&fake_ops, fresh));
+    hapi_emergency_remove(&fake_ops, fresh);
     free(fresh); /* a sanitizer would see a call that comes late */
   }
   atomic_store(&alarm_goes_on, 0);
@@ -373,7 +276,6 @@ TEST(the_black_box_of_a_session)
   hap_device *device;
   size_t count = 7;
   stage *s = stage_begin(HAP_DRIVE_LOCKSTEP, &device);
-  REQUIRE(s != NULL);
   CHECK(hap_session_advance(s->session, 400) == HAP_OK);
   CHECK(hap_session_black_box(s->session, rows, 512, sizeof(hap_black_box_row), &count) ==
             HAP_END &&
@@ -384,7 +286,7 @@ TEST(the_black_box_of_a_session)
         HAP_ERROR_ARGUMENT);
   CHECK(hap_session_black_box(s->session, rows, 512, sizeof(hap_black_box_row), NULL) ==
         HAP_ERROR_ARGUMENT);
-  atomic_store(&device_book.fail_write, 1);
+  atomic_store(&fakes[0].fail_write, 1);
   CHECK(hap_session_advance(s->session, 1) == HAP_FAULTED);
   CHECK(hap_session_black_box(s->session, rows, 512, sizeof(hap_black_box_row), &count) == HAP_OK &&
         count == 256);
@@ -431,16 +333,15 @@ TEST(faults_and_resets_race_with_readers)
   hap_device *device;
   static reader readers[2];
   stage *s = stage_begin(HAP_DRIVE_THREADS, &device);
-  REQUIRE(s != NULL);
   atomic_store(&alarm_goes_on, 1);
   for (int i = 0; i < 2; ++i) {
     readers[i].s = s;
     REQUIRE(pthread_create(&readers[i].thread, NULL, read_all_the_time, &readers[i]) == 0);
   }
   for (int i = 0; i < 50; ++i) {
-    atomic_store(&device_book.bad_pose, 1);
+    atomic_store(&fakes[0].bad_pose, 1);
     CHECK(run_until(s, has_fault));
-    atomic_store(&device_book.bad_pose, 0);
+    atomic_store(&fakes[0].bad_pose, 0);
     sleep_ms(2); /* a tick that still sees the bad pose */
     CHECK(hap_session_reset_fault(s->session) == HAP_OK);
     CHECK(run_until(s, has_no_fault));
@@ -450,7 +351,7 @@ TEST(faults_and_resets_race_with_readers)
     pthread_join(readers[i].thread, NULL);
     CHECK(readers[i].read > 0 && readers[i].wrong == 0);
   }
-  CHECK(atomic_load(&device_book.steep) == 0);
+  CHECK(atomic_load(&fakes[0].steep) == 0);
   stage_finish(s, device);
 }
 
@@ -491,7 +392,6 @@ TEST(a_stalled_physics_thread_is_a_state_and_no_fault)
   hap_device *device;
   atomic_store(&stall, 0);
   stage *s = stage_begin(HAP_DRIVE_THREADS, &device);
-  REQUIRE(s != NULL);
   CHECK(hap_session_lock(s->session) == HAP_OK);
   s->in_step = step_hang;
   CHECK(hap_session_unlock(s->session) == HAP_OK);
@@ -501,7 +401,7 @@ TEST(a_stalled_physics_thread_is_a_state_and_no_fault)
   atomic_store(&stall, 0);
   CHECK(run_until(s, feels_all));
   CHECK(stats_of(s).faults.stale_times >= 1 && stats_of(s).faults.stale_ticks >= 50);
-  CHECK(stats_of(s).faults.count == 0 && atomic_load(&device_book.steep) == 0);
+  CHECK(stats_of(s).faults.count == 0 && atomic_load(&fakes[0].steep) == 0);
   stage_finish(s, device);
 }
 
@@ -532,13 +432,10 @@ TEST(a_slew_limit_of_the_application)
   hap_pointer_research_def research;
   hap_pointer_id id;
   hap_device *device = NULL;
-  hap_detail detail;
-  memset(&device_book, 0, sizeof device_book);
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
-  dBodySetKinematic(s->cube);
+  stage_add_device(s, &device);
+  REQUIRE(hap_pointer_remove(s->session, hand) == HAP_OK);
   pointer_defs_init(&def, &expert, &research);
-  REQUIRE(hapi_device_open_ops(&booked_ops, "", &device, &detail) == HAP_OK);
-  REQUIRE(stage_create(s) == HAP_OK);
   def.device = device;
   expert.max_slew = -1.0;
   CHECK(hap_pointer_add(s->session, &def, &id) == HAP_ERROR_ARGUMENT);
@@ -551,7 +448,7 @@ TEST(a_slew_limit_of_the_application)
   double force = force_felt(s, &guard);
   CHECK(force > 1.0 && force <= 2.0 + 1e-9 && guard == HAP_GUARD_SLEW);
   CHECK(stats_of(s).faults.slewed_ticks > 0);
-  atomic_store(&device_book.bad_pose, 1);
+  atomic_store(&fakes[0].bad_pose, 1);
   CHECK(hap_session_advance(s->session, 10) == HAP_FAULTED);
   CHECK_NEAR(force_felt(s, &guard), force - 1.0,
              1e-9); /* after a fault 10 N go in 100 ms at the least */

@@ -14,8 +14,8 @@
 #include <hapode/hapode.h>
 
 #include "base/vec.h"
-#include "device/device.h"
 #include "device/identify.h"
+#include "tests/fake_device.h"
 
 static hap_status device_identify(hap_device *device, hap_device_identity *out, hap_detail *detail)
 {
@@ -136,38 +136,19 @@ typedef struct fake {
   double x[3];
   double v[3];
   double force[3];
-  int reads;
   double peak;            /* N, largest force that was asked for */
   double peak_after_zero; /* N, since the first zero */
   double farthest;        /* m */
-  int zeros;
-  int stops;
 } fake;
 
 static fake the;
 
-static hap_status fake_open(const char *args, void **self, hap_detail *detail)
+static bool is_pushing(void)
 {
-  (void)args;
-  (void)detail;
-  *self = &the;
-  return HAP_OK;
+  return atomic_load(&fakes[0].pushing) != 0;
 }
 
-static void fake_describe(void *self, hap_device_info *out)
-{
-  (void)self;
-  out->dof = 3;
-  out->max_force = 10.0;
-}
-
-static hap_status fake_start(void *self)
-{
-  (void)self;
-  return HAP_OK;
-}
-
-static void fake_move(fake *f, double h)
+static void motion_step(fake *f, double h)
 {
   for (int i = 0; i < 3; ++i) {
     double push = f->gain * f->force[i] + (i == 0 ? f->bias : 0.0) - 0.4 * f->v[i];
@@ -179,18 +160,18 @@ static void fake_move(fake *f, double h)
   f->farthest = fmax(f->farthest, hapi_v3_norm(f->x));
 }
 
-static hap_status fake_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                            uint32_t *buttons)
+static hap_status motion_read(fake_device *d, int64_t time_ns, hap_pose *pose, uint32_t *buttons)
 {
-  fake *f = self;
-  for (; f->reads > 0 && f->time_ns < time_ns; f->time_ns += 20000) {
-    fake_move(f, 2e-5);
+  fake *f = &the;
+  int reads = atomic_load(&d->reads);
+  *buttons = 0;
+  if (!is_pushing()) {
+    hapi_v3_set(f->force, 0.0, 0.0, 0.0);
+  }
+  for (; reads > 1 && f->time_ns < time_ns; f->time_ns += 20000) {
+    motion_step(f, 2e-5);
   }
   f->time_ns = time_ns;
-  memset(pose, 0, sizeof *pose);
-  memset(twist, 0, sizeof *twist);
-  *buttons = 0;
-  pose->quat_wxyz[0] = 1.0;
   hapi_v3_copy(f->x, pose->position);
   if (f->quantum > 0.0) {
     double c = cos(f->turned);
@@ -200,54 +181,32 @@ static hap_status fake_read(void *self, int64_t time_ns, hap_pose *pose, hap_twi
     hapi_v3_set(pose->position, c * a - s * b, s * a + c * b,
                 0.5 * f->quantum * round(2.0 * f->x[2] / f->quantum));
   }
-  if (++f->reads == f->bad_read) {
+  if (reads == f->bad_read) {
     pose->position[1] = (double)NAN;
     return f->fails ? HAP_ERROR_IO : HAP_OK;
   }
   return HAP_OK;
 }
 
-static hap_status fake_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static void motion_push(fake_device *d, const hap_wrench *wanted, hap_wrench *reached)
 {
-  fake *f = self;
+  fake *f = &the;
+  (void)reached;
   hapi_v3_copy(wanted->force, f->force);
   f->peak = fmax(f->peak, hapi_v3_norm(f->force));
-  f->peak_after_zero = f->zeros > 0 ? fmax(f->peak_after_zero, hapi_v3_norm(f->force)) : 0.0;
-  *reached = *wanted;
-  return HAP_OK;
-}
-
-static void fake_zero(void *self)
-{
-  fake *f = self;
-  hapi_v3_set(f->force, 0.0, 0.0, 0.0);
-  ++f->zeros;
-}
-
-static void fake_stop(void *self)
-{
-  fake *f = self;
-  ++f->stops;
-}
-
-static void fake_close(void *self)
-{
-  (void)self;
+  f->peak_after_zero =
+      atomic_load(&d->zeros) > 0 ? fmax(f->peak_after_zero, hapi_v3_norm(f->force)) : 0.0;
 }
 
 static hap_device *open_fake(const fake *as)
 {
-  hap_device_ops ops = {HAP_DEVICE_ABI, sizeof ops,    "fake",     "moves",   HAP_PACING_VIRTUAL,
-                        fake_open,      fake_describe, fake_start, fake_read, fake_write,
-                        fake_zero,      fake_stop,     fake_close};
-  static hap_device_ops kept;
-  hap_device *device = NULL;
-  hap_detail detail;
   the = *as;
-  ops.pacing = as->pacing;
-  kept = ops;
-  CHECK(hapi_device_open_ops(&kept, "", &device, &detail) == HAP_OK);
-  return device;
+  fakes_opened = 0;
+  fake_device *d = fake_next();
+  d->info.max_force = 10.0;
+  d->move = motion_read;
+  d->push = motion_push;
+  return fake_device_open((hap_device_pacing)as->pacing);
 }
 
 static hap_status identify_fake(const fake *as, hap_device_identity *out, hap_detail *detail)
@@ -255,7 +214,7 @@ static hap_status identify_fake(const fake *as, hap_device_identity *out, hap_de
   hap_device *device = open_fake(as);
   detail->text[0] = '\0';
   hap_status status = device_identify(device, out, detail);
-  CHECK(the.stops == 1 && the.zeros >= 1 && hapi_v3_norm(the.force) == 0.0);
+  CHECK(fakes[0].stops == 1 && fakes[0].zeros >= 1 && !is_pushing());
   CHECK(hapi_device_claim(device)); /* it was let go */
   hapi_device_release(device);
   hap_device_close(device);
@@ -315,10 +274,10 @@ TEST(failing_devices_are_let_go)
   hap_detail detail;
   fake mute = {.gain = 1.0, .bad_read = 700, .fails = true};
   CHECK(identify_fake(&mute, &found, &detail) == HAP_ERROR_DEVICE);
-  CHECK(strstr(detail.text, "cannot be read") != NULL && the.reads == 700);
+  CHECK(strstr(detail.text, "cannot be read") != NULL && fakes[0].reads == 700);
   fake mad = {.gain = 1.0, .bad_read = 900};
   CHECK(identify_fake(&mad, &found, &detail) == HAP_ERROR_DEVICE);
-  CHECK(strstr(detail.text, "not finite") != NULL && the.reads == 900);
+  CHECK(strstr(detail.text, "not finite") != NULL && fakes[0].reads == 900);
   fake first = {.gain = 1.0, .bad_read = 1, .fails = true};
   CHECK(identify_fake(&first, &found, &detail) == HAP_ERROR_DEVICE);
   CHECK(the.peak == 0.0);
@@ -391,7 +350,7 @@ TEST(person_can_stop_it)
     bool ran = pacings[k] != HAP_PACING_VIRTUAL && status == HAP_ERROR_DEVICE &&
                strstr(detail.text, "its force was taken off") != NULL;
     CHECK(status == HAP_END || ran || (fast && strstr(detail.text, "raise rate_hz") != NULL));
-    CHECK(the.stops == 1 && hapi_v3_norm(the.force) == 0.0);
+    CHECK(fakes[0].stops == 1 && !is_pushing());
     hap_device_close(opened);
   }
 }
@@ -400,10 +359,10 @@ static int alarm_while_it_pushes(void *user, double done)
 {
   int *zeros = user;
   (void)done;
-  if (hapi_v3_norm(the.force) > 0.0 && *zeros == 0) {
+  if (is_pushing() && *zeros == 0) {
     hap_emergency_zero();
-    *zeros = the.zeros;
-    CHECK(hapi_v3_norm(the.force) == 0.0);
+    *zeros = fakes[0].zeros;
+    CHECK(!is_pushing());
   }
   return 0;
 }
@@ -422,10 +381,10 @@ TEST(an_emergency_ends_it)
   def.user = &zeros;
   CHECK(hap_device_identify(opened, &def, &found, &detail) == HAP_ERROR_DEVICE);
   CHECK(strstr(detail.text, "hap_emergency_zero") != NULL);
-  CHECK(zeros == 1 && the.peak_after_zero == 0.0 && hapi_v3_norm(the.force) == 0.0);
-  zeros = the.zeros;
+  CHECK(zeros == 1 && the.peak_after_zero == 0.0 && !is_pushing());
+  zeros = fakes[0].zeros;
   hap_emergency_zero();
-  CHECK(the.zeros == zeros); /* it is stopped and may be gone */
+  CHECK(fakes[0].zeros == zeros); /* it is stopped and may be gone */
   hap_device_close(opened);
 }
 

@@ -11,105 +11,51 @@
 #include <signal.h>
 #include <sys/resource.h>
 
-#include "device/device.h"
+#include "tests/fake_device.h"
 #include "tests/recorded.h"
 
 /* ---- a device with a clock and troubles of its own ---- */
 
-static struct {
-  atomic_int fail_read;
-  atomic_int fail_write;
-  atomic_int fail_start;
-  atomic_int bad_pose;
-  atomic_int block_ms; /* the next read */
-  unsigned noise;
-} hand;
+static atomic_int block_ms; /* the next read */
+static unsigned noise;
 
-static hap_status hand_open(const char *args, void **self, hap_detail *detail)
+/* To and fro, into the row of cubes, as the wall clock says, with noise: no two runs are alike. */
+static hap_status hand_move(fake_device *d, int64_t time_ns, hap_pose *io, uint32_t *buttons)
 {
-  (void)args;
-  (void)detail;
-  *self = &hand;
+  double t = 1e-9 * (double)(hapi_clock_now() % (1000 * 1000 * MS));
+  int ms = atomic_exchange(&block_ms, 0);
+  (void)d;
+  (void)time_ns;
+  if (ms > 0) {
+    sleep_ms(ms);
+  }
+  noise = noise * 1664525u + 1013904223u;
+  io->position[0] = -0.01 + 0.012 * sin(9.0 * t) + 1e-6 * (noise >> 28);
+  io->position[2] = 0.025;
+  *buttons = noise >> 31;
   return HAP_OK;
 }
 
-static void hand_describe(void *self, hap_device_info *out)
+static void hand_push(fake_device *d, const hap_wrench *wanted, hap_wrench *reached)
 {
-  (void)self;
-  out->dof = 3;
-  out->max_force = 10.0;
-  out->damping = 1.0;
-  out->quantum = 1e-6;
-}
-
-static hap_status hand_start(void *self)
-{
-  (void)self;
-  return atomic_load(&hand.fail_start) != 0 ? HAP_ERROR_DEVICE : HAP_OK;
-}
-
-/* To and fro, into the row of cubes, as the wall clock says, with noise: no two runs are alike. */
-static hap_status hand_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                            uint32_t *buttons)
-{
-  double t = 1e-9 * (double)(hapi_clock_now() % (1000 * 1000 * MS));
-  int block_ms = atomic_exchange(&hand.block_ms, 0);
-  (void)self;
-  (void)time_ns;
-  if (block_ms > 0) {
-    sleep_ms(block_ms);
-  }
-  hand.noise = hand.noise * 1664525u + 1013904223u;
-  memset(pose, 0, sizeof *pose);
-  memset(twist, 0, sizeof *twist);
-  pose->quat_wxyz[0] = 1.0;
-  pose->position[0] = -0.01 + 0.012 * sin(9.0 * t) + 1e-6 * (hand.noise >> 28);
-  pose->position[2] = 0.025;
-  *buttons = hand.noise >> 31;
-  if (atomic_load(&hand.bad_pose) != 0) {
-    pose->position[1] = (double)NAN;
-  }
-  return atomic_load(&hand.fail_read) != 0 ? HAP_ERROR_DEVICE : HAP_OK;
-}
-
-static hap_status hand_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
-{
-  (void)self;
-  *reached = *wanted;
+  (void)d;
+  (void)wanted;
   reached->force[0] *= 0.5; /* it is weak */
-  return atomic_load(&hand.fail_write) != 0 ? HAP_ERROR_DEVICE : HAP_OK;
 }
-
-static void hand_nothing(void *self)
-{
-  (void)self;
-}
-
-static const hap_device_ops hand_ops = {
-    .abi = HAP_DEVICE_ABI,
-    .size = sizeof hand_ops,
-    .name = "hand",
-    .help = "of this test",
-    .pacing = HAP_PACING_HOST,
-    .open = hand_open,
-    .describe = hand_describe,
-    .start = hand_start,
-    .read = hand_read,
-    .write = hand_write,
-    .zero = hand_nothing,
-    .stop = hand_nothing,
-    .close = hand_nothing,
-};
 
 static hap_device *device;
 
 static hap_pointer_id add_hand(rig *r)
 {
-  hap_detail detail = {""};
   hap_pointer_def def;
   hap_pointer_id id = {0};
   hap_pointer_def_init(&def, sizeof def);
-  CHECK(hapi_device_open_ops(&hand_ops, "", &device, &detail) == HAP_OK);
+  fakes_opened = 0;
+  fake_device *d = fake_next();
+  d->info = (hap_device_info){.dof = 3, .max_force = 10.0, .damping = 1.0, .quantum = 1e-6};
+  d->move = hand_move;
+  d->push = hand_push;
+  device = fake_device_open(HAP_PACING_HOST);
   def.device = device;
   def.stiffness = 2000.0;
   def.damping = 5.0;
@@ -483,7 +429,8 @@ static hap_pointer_id guest;
 
 static void make_trouble(rig *r, int look)
 {
-  static atomic_int *const troubles[] = {&hand.fail_read, &hand.fail_write, &hand.bad_pose};
+  static atomic_int *const troubles[] = {&fakes[0].fail_read, &fakes[0].fail_write,
+                                         &fakes[0].bad_pose};
   hap_pose pose = {{0.5, 0.0, 0.025}, {1.0, 0.0, 0.0, 0.0}};
   hap_pointer_def def;
   hap_pointer_def_init(&def, sizeof def);
@@ -506,7 +453,7 @@ static void make_trouble(rig *r, int look)
     atomic_store(troubles[look / 4 % 3], 0);
     CHECK(hap_session_reset_fault(r->session) == HAP_OK);
   } else if (look == 18) {
-    atomic_store(&hand.block_ms, 30);
+    atomic_store(&block_ms, 30);
   }
 }
 
@@ -538,13 +485,13 @@ static hap_pointer_id lost;
 static void lose_and_restart(rig *r, int look)
 {
   if (look == 4) {
-    atomic_store(&hand.fail_read, 1);
+    atomic_store(&fakes[0].fail_read, 1);
   } else if (look == 6) {
-    atomic_store(&hand.fail_read, 0);
-    atomic_store(&hand.fail_start, 1);
+    atomic_store(&fakes[0].fail_read, 0);
+    atomic_store(&fakes[0].fail_start, 1);
     CHECK(hap_pointer_restart(r->session, lost) == HAP_ERROR_DEVICE);
   } else if (look == 10) {
-    atomic_store(&hand.fail_start, 0);
+    atomic_store(&fakes[0].fail_start, 0);
     CHECK(hap_pointer_restart(r->session, lost) == HAP_OK);
     CHECK(hap_session_reset_fault(r->session) == HAP_OK);
   } else if (look == 14) { /* nothing wrong with it */

@@ -6,154 +6,17 @@
 #include "tests/tap.h"
 
 #include <pthread.h>
-#include <stdatomic.h>
 #include <stddef.h>
 
-#include <hapode/device_impl.h>
-
-#include "base/vec.h"
-#include "device/device.h"
+#include "tests/fake_device.h"
 #include "tests/stage.h"
 
-/* ---- a device that fails on demand and keeps book ---- */
-
-typedef struct fake {
-  /* what it shall do */
-  atomic_int fail_start;
-  atomic_int fail_read;
-  atomic_int fail_write;
-  atomic_int bad_pose;
-  double x; /* where it is; the cube's face is at -0.05 */
-  /* what was done to it */
-  atomic_int starts;
-  atomic_int stops;
-  atomic_int closes;
-  atomic_int reads;
-  atomic_int writes;
-  atomic_int wrong;   /* calls out of order, or a force that is not finite */
-  atomic_int pushing; /* the last force given was not zero */
-  atomic_int zeroed;  /* the last of zero and write was a zero */
-  atomic_int since_read;
-  atomic_int running;
-} fake;
-
-static fake fakes[4];
-static int fakes_opened;
-
-static hap_status fake_open(const char *args, void **self, hap_detail *detail)
-{
-  (void)args;
-  (void)detail;
-  *self = &fakes[fakes_opened++];
-  return HAP_OK;
-}
-
-static void fake_describe(void *self, hap_device_info *out)
-{
-  (void)self;
-  out->dof = 3;
-  out->max_force = 12.0;
-}
-
-static hap_status fake_start(void *self)
-{
-  fake *d = self;
-  atomic_fetch_add(&d->starts, 1);
-  if (atomic_load(&d->fail_start) != 0) {
-    return HAP_ERROR_DEVICE;
-  }
-  atomic_fetch_add(&d->wrong, atomic_exchange(&d->running, 1) != 0);
-  return HAP_OK;
-}
-
-static hap_status fake_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                            uint32_t *buttons)
-{
-  fake *d = self;
-  (void)time_ns;
-  atomic_fetch_add(&d->reads, 1);
-  atomic_fetch_add(&d->wrong, atomic_load(&d->running) != 1);
-  atomic_store(&d->since_read, 1);
-  if (atomic_load(&d->fail_read) != 0) {
-    pose->position[0] = -0.02; /* not to be used */
-    return HAP_ERROR_DEVICE;
-  }
-  memset(twist, 0, sizeof *twist);
-  *pose = (hap_pose){{d->x, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  if (atomic_load(&d->bad_pose) != 0) {
-    pose->position[1] = (double)NAN;
-  }
-  *buttons = 5;
-  return HAP_OK;
-}
-
-static hap_status fake_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
-{
-  fake *d = self;
-  bool good = hapi_finite(wanted->force, 3) && hapi_finite(wanted->torque, 3) &&
-              hapi_v3_norm(wanted->force) <= 12.0 * (1.0 + 1e-12);
-  bool first = atomic_exchange(&d->since_read, 0) == 1; /* one write after one read */
-  atomic_fetch_add(&d->writes, 1);
-  atomic_fetch_add(&d->wrong, !good || !first || atomic_load(&d->running) != 1);
-  if (atomic_load(&d->fail_write) != 0) {
-    return HAP_ERROR_DEVICE;
-  }
-  *reached = *wanted;
-  atomic_store(&d->pushing, hapi_v3_norm(wanted->force) != 0.0);
-  atomic_store(&d->zeroed, hapi_v3_norm(wanted->force) == 0.0);
-  return HAP_OK;
-}
-
-static void fake_zero(void *self)
-{
-  fake *d = self;
-  atomic_store(&d->pushing, 0);
-  atomic_store(&d->zeroed, 1);
-}
-
-static void fake_stop(void *self)
-{
-  fake *d = self;
-  atomic_fetch_add(&d->stops, 1);
-  atomic_fetch_add(&d->wrong, atomic_load(&d->zeroed) != 1); /* zero comes first */
-  atomic_fetch_add(&d->wrong, atomic_exchange(&d->running, 0) != 1);
-}
-
-static void fake_close(void *self)
-{
-  fake *d = self;
-  atomic_fetch_add(&d->closes, 1);
-  atomic_fetch_add(&d->wrong, atomic_load(&d->running) != 0 || atomic_load(&d->zeroed) != 1);
-}
-
-static hap_device_ops fake_ops = {
-    .abi = HAP_DEVICE_ABI,
-    .size = sizeof(hap_device_ops),
-    .name = "fake",
-    .help = "for tests",
-    .pacing = HAP_PACING_VIRTUAL,
-    .open = fake_open,
-    .describe = fake_describe,
-    .start = fake_start,
-    .read = fake_read,
-    .write = fake_write,
-    .zero = fake_zero,
-    .stop = fake_stop,
-    .close = fake_close,
-};
-
-/* Fresh fakes; the first one opened stands 3 mm deep in the cube. */
+/* The first one opened stands 3 mm deep in the cube, the others beside it. */
 static hap_device *open_fake(hap_device_pacing pacing)
 {
-  hap_device *device = NULL;
-  hap_detail detail;
-  if (fakes_opened == 0) {
-    memset(fakes, 0, sizeof fakes);
-  }
-  fakes[fakes_opened].x = fakes_opened == 0 ? -0.057 : 1.0;
-  fake_ops.pacing = pacing;
-  CHECK(hapi_device_open_ops(&fake_ops, "", &device, &detail) == HAP_OK);
-  return device;
+  bool first = fakes_opened == 0;
+  fake_next()->x = first ? FAKE_DEPTH_X : 1.0;
+  return fake_device_open(pacing);
 }
 
 static hap_pointer_def pointer_def(hap_device *device)
@@ -173,10 +36,9 @@ static stage *run_with_fake(hap_drive drive, hap_device **out)
   dBodySetKinematic(s->cube);
   *out = open_fake(HAP_PACING_VIRTUAL);
   hap_pointer_def def = pointer_def(*out);
-  return (stage_create(s) == HAP_OK && hap_pointer_add(s->session, &def, &id) == HAP_OK &&
-          hap_session_start(s->session) == HAP_OK)
-             ? s
-             : NULL;
+  REQUIRE(stage_create(s) == HAP_OK && hap_pointer_add(s->session, &def, &id) == HAP_OK);
+  session_run(s->session);
+  return s;
 }
 
 static void end_with_fake(stage *s, hap_device *device)
@@ -188,7 +50,7 @@ static void end_with_fake(stage *s, hap_device *device)
   CHECK(atomic_load(&fakes[0].closes) == 1 && atomic_load(&fakes[0].zeroed) == 1);
 }
 
-static bool fake_pushes(const fake *d)
+static bool fake_pushes(const fake_device *d)
 {
   return atomic_load(&d->pushing) == 1;
 }
@@ -200,7 +62,6 @@ static void fault_and_reset(atomic_int *cause, hap_fault fault, const char *text
 {
   hap_device *device;
   stage *s = run_with_fake(HAP_DRIVE_LOCKSTEP, &device);
-  REQUIRE(s != NULL);
   CHECK(hap_session_advance(s->session, 50) == HAP_OK);
   CHECK(fake_pushes(&fakes[0]) && stats_of(s).faults.fault == HAP_FAULT_NONE);
   atomic_store(cause, 1);
@@ -243,7 +104,6 @@ TEST(one_bad_device_takes_the_force_of_all)
   hap_device *devices[2];
   hap_pointer_id id;
   stage *s = run_with_fake(HAP_DRIVE_LOCKSTEP, &devices[0]);
-  REQUIRE(s != NULL);
   devices[1] = open_fake(HAP_PACING_VIRTUAL);
   hap_pointer_def def = pointer_def(devices[1]);
   CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK); /* while it runs */
@@ -270,7 +130,6 @@ TEST(zero_is_the_last_thing_that_is_written)
   for (int way = 0; way < 9; ++way) {
     hap_device *device;
     stage *s = run_with_fake(drives[way % 3], &device);
-    REQUIRE(s != NULL);
     for (int i = 0; i < 2000 && !fake_pushes(&fakes[0]); ++i) {
       sleep_ms(s->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : 1);
       CHECK(s->def.drive != HAP_DRIVE_LOCKSTEP || hap_session_advance(s->session, 1) == HAP_OK);
@@ -349,14 +208,12 @@ TEST(devices_with_a_clock_of_their_own_cannot_run_in_lockstep)
     hap_device_close(device);
     CHECK(atomic_load(&fakes[0].closes) == 1);
   }
-  fake_ops.pacing = HAP_PACING_VIRTUAL;
 }
 
 TEST(a_device_limits_the_force)
 {
   hap_device *device;
-  stage *s = run_with_fake(HAP_DRIVE_LOCKSTEP, &device);
-  REQUIRE(s != NULL); /* 12 N, below the pointer's 20 */
+  stage *s = run_with_fake(HAP_DRIVE_LOCKSTEP, &device); /* 12 N, below the pointer's 20 */
   for (int i = 0; i <= 30; ++i) {
     fakes[0].x = -0.06 + 1e-3 * i; /* 30 mm deep: 30 N */
     CHECK(hap_session_advance(s->session, 10) == HAP_OK);
