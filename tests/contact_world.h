@@ -209,7 +209,10 @@ static inline void cw_start(contact_world *w, double x, double y, double z)
     memcpy(w->position[i], dBodyGetPosition(w->bodies[i]), 3 * sizeof(double));
   }
   REQUIRE(hap_session_trace_bodies(w->session, w->bodies, traced) == HAP_OK);
-  REQUIRE(hap_pointer_add(w->session, &w->hand_def, &w->hand) == HAP_OK);
+  hap_detail detail = {""};
+  bool added = hap_pointer_add(w->session, &w->hand_def, &w->hand) == HAP_OK;
+  (void)hap_session_detail(w->session, &detail);
+  REQUIRE_SAY(added, "%s", detail.text);
   cw_put_hand(w, 0.0, 0.0, 0.0);
   session_run(w->session);
 }

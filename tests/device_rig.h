@@ -28,18 +28,17 @@ static inline void rig_owned(void *owned)
   }
 }
 
-/* Started; it goes when the test has ended. NULL, and a comment why, when it cannot be. */
+/* Started; it goes when the test has ended. */
 static inline device_rig *rig_new(const char *spec)
 {
   hap_detail detail;
   device_rig *r = tap_own(sizeof *r, rig_owned);
-  if (hap_device_open(spec, &r->device, &detail) != HAP_OK) {
-    printf("# %s: %s\n", spec, detail.text);
-    return NULL;
-  }
+  bool good = hap_device_open(spec, &r->device, &detail) == HAP_OK;
+  REQUIRE_SAY(good, "%s: %s", spec, detail.text);
   r->ops = hapi_device_ops(r->device);
   r->self = hapi_device_self(r->device);
-  return r->ops->start(r->self) == HAP_OK ? r : NULL;
+  REQUIRE(r->ops->start(r->self) == HAP_OK);
+  return r;
 }
 
 #endif

@@ -16,62 +16,45 @@
 #include <hapode/hapode.h>
 
 #include "base/vec.h"
-#include "device/device.h"
+#include "tests/device_rig.h"
 
 #define PI 3.14159265358979323846
 #define T0 123456789LL /* ns; the device must not care where time begins */
 
 static char motion_path[160];
 
-typedef struct rig {
-  hap_device *device;
-  const hap_device_ops *ops;
-  void *self;
-  hap_pose pose;
-  hap_twist twist;
-  hap_detail detail;
-} rig;
+static void replay_spec(const char *path, const char *arguments, char out[512])
+{
+  REQUIRE(snprintf(out, 512, "replay:%s%s", path, arguments) < 512);
+}
 
 /* arguments: what follows the file name */
-static hap_status rig_open(rig *r, const char *path, const char *arguments)
+static device_rig *rig_new_replay(const char *path, const char *arguments)
 {
   char spec[512];
-  memset(r, 0, sizeof *r);
-  snprintf(spec, sizeof spec, "replay:%s%s", path, arguments);
-  hap_status status = hap_device_open(spec, &r->device, &r->detail);
-  CHECK((status < 0) == (r->device == NULL));
-  if (status < 0) {
-    return status;
-  }
-  r->ops = hapi_device_ops(r->device);
-  r->self = hapi_device_self(r->device);
-  return r->ops->start(r->self);
+  replay_spec(path, arguments, spec);
+  return rig_new(spec);
 }
 
-static bool rig_good(rig *r, const char *path, const char *arguments)
+static hap_status replay_try(const char *path, const char *arguments, hap_detail *detail)
 {
-  bool good = rig_open(r, path, arguments) == HAP_OK;
-  if (!good) {
-    printf("# %s\n", r->detail.text);
-  }
-  return good;
+  char spec[512];
+  hap_device *device = NULL;
+  replay_spec(path, arguments, spec);
+  hap_status status = hap_device_open(spec, &device, detail);
+  CHECK((status < 0) == (device == NULL));
+  hap_device_close(device);
+  return status;
 }
 
-static void rig_close(rig *r)
-{
-  r->ops->zero(r->self);
-  r->ops->stop(r->self);
-  hap_device_close(r->device);
-}
-
-static void rig_read(rig *r, int64_t since_ns)
+static void rig_read(device_rig *r, int64_t since_ns)
 {
   uint32_t buttons = 77;
   CHECK(r->ops->read(r->self, T0 + since_ns, &r->pose, &r->twist, &buttons) == HAP_OK);
   CHECK(buttons == 0);
 }
 
-static void rig_restart(rig *r)
+static void rig_restart(device_rig *r)
 {
   r->ops->stop(r->self);
   CHECK(r->ops->start(r->self) == HAP_OK);
@@ -86,106 +69,93 @@ TEST(rows_are_met_exactly)
   static const double t[] = {0.0, 0.01, 0.015, 0.1, 0.123456789};
   static const double p[][3] = {
       {0.1, 0.2, 0.3}, {0.11, -0.5, 0.5}, {0.2, 1.0, 2.0}, {0.0, 0.0, 0.0}, {1.0, 1.0, 1.0}};
-  rig r;
-  REQUIRE(rig_good(&r, motion_path, ""));
-  CHECK(r.ops->pacing == HAP_PACING_VIRTUAL);
+  device_rig *r = rig_new_replay(motion_path, "");
+  CHECK(r->ops->pacing == HAP_PACING_VIRTUAL);
   for (int i = 0; i < 5; ++i) {
-    rig_read(&r, llround(t[i] * 1e9));
+    rig_read(r, llround(t[i] * 1e9));
     for (int k = 0; k < 3; ++k) {
-      CHECK_NEAR(r.pose.position[k], p[i][k], 0.0);
+      CHECK_NEAR(r->pose.position[k], p[i][k], 0.0);
     }
-    CHECK(r.pose.quat_wxyz[0] == 1.0 && hapi_v3_norm(r.twist.angular) == 0.0);
+    CHECK(r->pose.quat_wxyz[0] == 1.0 && hapi_v3_norm(r->twist.angular) == 0.0);
   }
-  rig_close(&r);
 }
 
 TEST(info_tells_what_the_file_has)
 {
-  rig r;
   file_write(motion_path, "t,x,y,z\n0,0,0,0\n");
-  REQUIRE(rig_good(&r, motion_path, ""));
-  const hap_device_info *info = hapi_device_info(r.device);
+  device_rig *r = rig_new_replay(motion_path, "");
+  const hap_device_info *info = hapi_device_info(r->device);
   CHECK(info->dof == 3 && info->max_force == 20.0 && strcmp(info->name, "replay") == 0);
-  rig_close(&r);
   file_write(motion_path, "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,0,2,0,0\n");
-  REQUIRE(rig_good(&r, motion_path, ""));
-  CHECK(hapi_device_info(r.device)->dof == 6);
-  rig_read(&r, 0);
-  CHECK_NEAR(r.pose.quat_wxyz[1], 1.0, 1e-15);
-  rig_close(&r);
+  r = rig_new_replay(motion_path, "");
+  CHECK(hapi_device_info(r->device)->dof == 6);
+  rig_read(r, 0);
+  CHECK_NEAR(r->pose.quat_wxyz[1], 1.0, 1e-15);
 }
 
 TEST(ends_are_at_rest)
 {
-  rig r;
   file_write(motion_path, "t,x,y,z\n0.5,1,0,0\n1,2,0,0\n1.5,3,0,0\n");
-  REQUIRE(rig_good(&r, motion_path, ""));
-  rig_read(&r, 0);
-  CHECK(r.pose.position[0] == 1.0 && r.twist.linear[0] == 0.0);
-  rig_read(&r, 499999999);
-  CHECK(r.pose.position[0] == 1.0 && r.twist.linear[0] == 0.0);
-  rig_read(&r, 750000000);
-  CHECK_NEAR(r.pose.position[0], 1.5, 1e-14); /* three rows on a line: a line */
-  CHECK_NEAR(r.twist.linear[0], 2.0, 1e-14);
-  rig_read(&r, 1500000001);
-  CHECK(r.pose.position[0] == 3.0 && r.twist.linear[0] == 0.0);
-  rig_read(&r, 3600000000000);
-  CHECK(r.pose.position[0] == 3.0 && r.twist.linear[0] == 0.0);
+  device_rig *r = rig_new_replay(motion_path, "");
+  rig_read(r, 0);
+  CHECK(r->pose.position[0] == 1.0 && r->twist.linear[0] == 0.0);
+  rig_read(r, 499999999);
+  CHECK(r->pose.position[0] == 1.0 && r->twist.linear[0] == 0.0);
+  rig_read(r, 750000000);
+  CHECK_NEAR(r->pose.position[0], 1.5, 1e-14); /* three rows on a line: a line */
+  CHECK_NEAR(r->twist.linear[0], 2.0, 1e-14);
+  rig_read(r, 1500000001);
+  CHECK(r->pose.position[0] == 3.0 && r->twist.linear[0] == 0.0);
+  rig_read(r, 3600000000000);
+  CHECK(r->pose.position[0] == 3.0 && r->twist.linear[0] == 0.0);
   uint32_t buttons;
-  CHECK(r.ops->read(r.self, T0, &r.pose, &r.twist, &buttons) == HAP_ERROR_ARGUMENT);
-  rig_restart(&r);
-  CHECK(r.pose.position[0] == 1.0);
-  rig_close(&r);
+  CHECK(r->ops->read(r->self, T0, &r->pose, &r->twist, &buttons) == HAP_ERROR_ARGUMENT);
+  rig_restart(r);
+  CHECK(r->pose.position[0] == 1.0);
 }
 
 TEST(one_row_is_a_constant)
 {
-  rig r;
   file_write(motion_path, "t,x,y,z\n3,1,2,3\n");
-  REQUIRE(rig_good(&r, motion_path, ""));
+  device_rig *r = rig_new_replay(motion_path, "");
   for (int i = 0; i < 5; ++i) {
-    rig_read(&r, i * 1000000000LL);
-    CHECK(r.pose.position[2] == 3.0 && hapi_v3_norm(r.twist.linear) == 0.0);
+    rig_read(r, i * 1000000000LL);
+    CHECK(r->pose.position[2] == 3.0 && hapi_v3_norm(r->twist.linear) == 0.0);
   }
-  rig_close(&r);
 }
 
 TEST(two_rows_are_a_line)
 {
-  rig r;
   file_write(motion_path, "t,x,y,z\n0,0,0,0\n2,1,2,-4\n");
-  REQUIRE(rig_good(&r, motion_path, ""));
-  rig_read(&r, 0);
-  CHECK_NEAR(r.twist.linear[2], -2.0, 1e-15);
-  rig_read(&r, 500000000);
-  CHECK_NEAR(r.pose.position[1], 0.5, 1e-15);
-  CHECK_NEAR(r.twist.linear[0], 0.5, 1e-15);
-  rig_close(&r);
+  device_rig *r = rig_new_replay(motion_path, "");
+  rig_read(r, 0);
+  CHECK_NEAR(r->twist.linear[2], -2.0, 1e-15);
+  rig_read(r, 500000000);
+  CHECK_NEAR(r->pose.position[1], 0.5, 1e-15);
+  CHECK_NEAR(r->twist.linear[0], 0.5, 1e-15);
 }
 
 TEST(arguments_map_the_motion)
 {
-  rig r;
   file_write(motion_path,
              "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,1,2,3,1,0,0,0\n2,2,4,6,1,0,0,0\n");
   /* a quarter turn about z: x -> y, y -> -x */
-  REQUIRE(rig_good(&r, motion_path, ",scale=0.5,offset=10/20/30,rotate=1/0/0/1,start=0.5"));
-  rig_read(&r, 0);
-  rig_read(&r, 500000000);
-  CHECK_NEAR(r.pose.position[0], 10.0 - 1.0, 1e-14);
-  CHECK_NEAR(r.pose.position[1], 20.0 + 0.5, 1e-14);
-  CHECK_NEAR(r.pose.position[2], 30.0 + 1.5, 1e-14);
-  CHECK_NEAR(r.twist.linear[0], -1.0, 1e-14);
-  CHECK_NEAR(r.twist.linear[1], 0.5, 1e-14);
-  CHECK_NEAR(r.pose.quat_wxyz[0], sqrt(0.5), 1e-15);
-  CHECK_NEAR(r.pose.quat_wxyz[3], sqrt(0.5), 1e-15);
-  rig_close(&r);
+  device_rig *r =
+      rig_new_replay(motion_path, ",scale=0.5,offset=10/20/30,rotate=1/0/0/1,start=0.5");
+  rig_read(r, 0);
+  rig_read(r, 500000000);
+  CHECK_NEAR(r->pose.position[0], 10.0 - 1.0, 1e-14);
+  CHECK_NEAR(r->pose.position[1], 20.0 + 0.5, 1e-14);
+  CHECK_NEAR(r->pose.position[2], 30.0 + 1.5, 1e-14);
+  CHECK_NEAR(r->twist.linear[0], -1.0, 1e-14);
+  CHECK_NEAR(r->twist.linear[1], 0.5, 1e-14);
+  CHECK_NEAR(r->pose.quat_wxyz[0], sqrt(0.5), 1e-15);
+  CHECK_NEAR(r->pose.quat_wxyz[3], sqrt(0.5), 1e-15);
   file_write(motion_path,
              "t,x,y,z\n0,0,0,0\n"); /* without a quaternion the orientation is that of rotate */
-  REQUIRE(rig_good(&r, motion_path, ",rotate=1/0/0/1"));
-  rig_read(&r, 0);
-  CHECK_NEAR(r.pose.quat_wxyz[3], sqrt(0.5), 1e-15);
-  rig_close(&r);
+  r = rig_new_replay(motion_path, ",rotate=1/0/0/1");
+  rig_read(r, 0);
+  CHECK_NEAR(r->pose.quat_wxyz[3], sqrt(0.5), 1e-15);
 }
 
 TEST(start_far_into_the_recording)
@@ -197,13 +167,11 @@ TEST(start_far_into_the_recording)
     fprintf(file, "%.2f,%d,0,0\n", i * 0.01, i);
   }
   fclose(file);
-  rig r;
-  REQUIRE(rig_good(&r, motion_path, ",start=150"));
+  device_rig *r = rig_new_replay(motion_path, ",start=150");
   for (int i = 0; i < 100; ++i) {
-    rig_read(&r, i * 37000000LL);
-    CHECK_NEAR(r.pose.position[0], 15000.0 + i * 3.7, 1e-8);
+    rig_read(r, i * 37000000LL);
+    CHECK_NEAR(r->pose.position[0], 15000.0 + i * 3.7, 1e-8);
   }
-  rig_close(&r);
 }
 
 /* 100 Hz rows of a 2 Hz sine, read at 1 kHz. */
@@ -227,8 +195,7 @@ TEST(sine_comes_back_smooth)
   const double hz = 2.0;
   const double w = 2.0 * PI * hz;
   write_sine(hz, 301);
-  rig r;
-  REQUIRE(rig_good(&r, motion_path, ""));
+  device_rig *r = rig_new_replay(motion_path, "");
   /* bounds of the cubic spline away from its ends (Hall and Meyer 1976): 5/384 h^4 y'''' for the
    * value, 1/24 h^3 y'''' for the slope; the natural ends die out within a few rows */
   double value_bound = 5.0 / 384.0 * pow(0.01, 4) * 0.1 * pow(w, 4) * 1.05;
@@ -236,18 +203,17 @@ TEST(sine_comes_back_smooth)
   double before = (double)NAN;
   for (int i = 0; i <= 3000; ++i) {
     double t = i * 1e-3;
-    rig_read(&r, i * 1000000LL);
+    rig_read(r, i * 1000000LL);
     if (t >= 0.2 && t <= 2.8) {
-      CHECK_NEAR(r.pose.position[0], 0.1 * sin(w * t), value_bound);
-      CHECK_NEAR(r.twist.linear[0], 0.1 * w * cos(w * t), slope_bound);
-      CHECK_NEAR(r.pose.position[1], 0.1 * cos(w * t), value_bound);
+      CHECK_NEAR(r->pose.position[0], 0.1 * sin(w * t), value_bound);
+      CHECK_NEAR(r->twist.linear[0], 0.1 * w * cos(w * t), slope_bound);
+      CHECK_NEAR(r->pose.position[1], 0.1 * cos(w * t), value_bound);
     }
     if (i > 0) { /* velocity without steps: what the acceleration of 0.1 w^2 can do in 1 ms */
-      CHECK_NEAR(r.twist.linear[0], before, 0.1 * w * w * 1e-3 * 1.3);
+      CHECK_NEAR(r->twist.linear[0], before, 0.1 * w * w * 1e-3 * 1.3);
     }
-    before = r.twist.linear[0];
+    before = r->twist.linear[0];
   }
-  rig_close(&r);
 }
 
 static double random_share(uint32_t *state)
@@ -290,90 +256,78 @@ static void angular_between(const double a[4], const double b[4], double dt, dou
 TEST(twist_is_the_derivative_of_the_pose)
 {
   write_turning(200, true);
-  rig r;
-  rig near;
-  REQUIRE(rig_good(&r, motion_path, ",scale=2,rotate=0.5/-0.5/0.1/0.7,offset=1/2/3"));
-  REQUIRE(rig_good(&near, motion_path, ",scale=2,rotate=0.5/-0.5/0.1/0.7,offset=1/2/3"));
-  rig_read(&r, 0);
-  rig_read(&near, 0);
+  device_rig *r = rig_new_replay(motion_path, ",scale=2,rotate=0.5/-0.5/0.1/0.7,offset=1/2/3");
+  device_rig *near = rig_new_replay(motion_path, ",scale=2,rotate=0.5/-0.5/0.1/0.7,offset=1/2/3");
+  rig_read(r, 0);
+  rig_read(near, 0);
   for (int i = 1; i < 1500; ++i) {
     const int64_t half = 10000; /* 10 us */
-    rig_read(&near, i * 1000000LL - half);
-    rig_read(&r, i * 1000000LL);
-    hap_pose first = near.pose;
-    rig_read(&near, i * 1000000LL + half);
+    rig_read(near, i * 1000000LL - half);
+    rig_read(r, i * 1000000LL);
+    hap_pose first = near->pose;
+    rig_read(near, i * 1000000LL + half);
     double angular[3];
-    angular_between(first.quat_wxyz, near.pose.quat_wxyz, 2e-5, angular);
+    angular_between(first.quat_wxyz, near->pose.quat_wxyz, 2e-5, angular);
     for (int k = 0; k < 3; ++k) {
-      double linear = (near.pose.position[k] - first.position[k]) / 2e-5;
-      CHECK_NEAR(r.twist.linear[k], linear, 2e-5);
-      CHECK_NEAR(r.twist.angular[k], angular[k], 2e-5);
+      double linear = (near->pose.position[k] - first.position[k]) / 2e-5;
+      CHECK_NEAR(r->twist.linear[k], linear, 2e-5);
+      CHECK_NEAR(r->twist.angular[k], angular[k], 2e-5);
     }
     double norm = 0.0;
     for (int k = 0; k < 4; ++k) {
-      norm += r.pose.quat_wxyz[k] * r.pose.quat_wxyz[k];
+      norm += r->pose.quat_wxyz[k] * r->pose.quat_wxyz[k];
     }
     CHECK_NEAR(norm, 1.0, 1e-14);
   }
-  rig_close(&r);
-  rig_close(&near);
 }
 
 TEST(rotation_has_the_speed_of_the_truth)
 {
   write_turning(200, true);
-  rig r;
-  REQUIRE(rig_good(&r, motion_path, ""));
+  device_rig *r = rig_new_replay(motion_path, "");
   for (int i = 0; i < 1500; ++i) {
     double t = i * 1e-3;
-    rig_read(&r, i * 1000000LL);
+    rig_read(r, i * 1000000LL);
     if (t > 0.2) {
       double w = 3.0 + 5.0 * cos(5.0 * t);
-      CHECK_NEAR(r.twist.angular[0], 0.6 * w, 5e-3);
-      CHECK_NEAR(r.twist.angular[1], 0.0, 1e-12);
-      CHECK_NEAR(r.twist.angular[2], 0.8 * w, 5e-3);
+      CHECK_NEAR(r->twist.angular[0], 0.6 * w, 5e-3);
+      CHECK_NEAR(r->twist.angular[1], 0.0, 1e-12);
+      CHECK_NEAR(r->twist.angular[2], 0.8 * w, 5e-3);
       double half = 0.5 * (3.0 * t + sin(5.0 * t));
-      CHECK_NEAR(fabs(r.pose.quat_wxyz[0]), fabs(cos(half)), 1e-5);
+      CHECK_NEAR(fabs(r->pose.quat_wxyz[0]), fabs(cos(half)), 1e-5);
     }
   }
-  rig_close(&r);
 }
 
 TEST(signs_of_quaternions_do_not_matter)
 {
-  rig a;
-  rig b;
   write_turning(100, true);
-  REQUIRE(rig_good(&a, motion_path, ""));
+  device_rig *a = rig_new_replay(motion_path, "");
   write_turning(100, false);
-  REQUIRE(rig_good(&b, motion_path, ""));
+  device_rig *b = rig_new_replay(motion_path, "");
   for (int i = 0; i < 900; ++i) {
-    rig_read(&a, i * 1000000LL);
-    rig_read(&b, i * 1000000LL);
+    rig_read(a, i * 1000000LL);
+    rig_read(b, i * 1000000LL);
     double along = 0.0;
     for (int k = 0; k < 4; ++k) {
-      along += a.pose.quat_wxyz[k] * b.pose.quat_wxyz[k];
+      along += a->pose.quat_wxyz[k] * b->pose.quat_wxyz[k];
     }
     CHECK_NEAR(fabs(along), 1.0, 1e-14);
-    CHECK_NEAR(a.twist.angular[0], b.twist.angular[0], 1e-9);
+    CHECK_NEAR(a->twist.angular[0], b->twist.angular[0], 1e-9);
   }
-  rig_close(&a);
-  rig_close(&b);
 }
 
 TEST(half_turns_between_rows_stay_finite)
 {
-  rig r;
   file_write(
       motion_path,
       "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0,0,0,0,1,0,0\n2,0,0,0,-1,0,0,0\n3,0,0,0,0,0,1,0\n"
       "4,0,0,0,1,0,0,0\n");
-  REQUIRE(rig_good(&r, motion_path, ""));
+  device_rig *r = rig_new_replay(motion_path, "");
   for (int i = 0; i < 4200; ++i) {
-    rig_read(&r, i * 1000000LL);
-    CHECK(hapi_finite(r.pose.quat_wxyz, 4) && hapi_finite(r.twist.angular, 3));
+    rig_read(r, i * 1000000LL);
+    CHECK(hapi_finite(r->pose.quat_wxyz, 4) && hapi_finite(r->twist.angular, 3));
   }
-  rig_close(&r);
 }
 
 TEST(forms_of_text_are_accepted)
@@ -385,14 +339,12 @@ TEST(forms_of_text_are_accepted)
                                      "t,x,y,z\n0e0,1.,2.0,+3\n1,2,3,4\n",
                                      "t,x,y,z\n-0,1,2,3\n1,2,3,4\n"};
   for (size_t i = 0; i < sizeof good / sizeof good[0]; ++i) {
-    rig r;
     file_write(motion_path, good[i]);
-    REQUIRE(rig_good(&r, motion_path, ""));
-    rig_read(&r, 0);
-    CHECK(r.pose.position[0] == 1.0 && r.pose.position[2] == 3.0);
-    rig_read(&r, 1000000000);
-    CHECK(r.pose.position[0] == 2.0 && r.pose.position[2] == 4.0);
-    rig_close(&r);
+    device_rig *r = rig_new_replay(motion_path, "");
+    rig_read(r, 0);
+    CHECK(r->pose.position[0] == 1.0 && r->pose.position[2] == 3.0);
+    rig_read(r, 1000000000);
+    CHECK(r->pose.position[0] == 2.0 && r->pose.position[2] == 4.0);
   }
 }
 
@@ -442,24 +394,23 @@ static const bad_file bad_files[] = {
 TEST(malformed_files_are_named_by_line)
 {
   for (size_t i = 0; i < sizeof bad_files / sizeof bad_files[0]; ++i) {
-    rig r;
+    hap_detail detail;
     char place[200];
     file_write(motion_path, bad_files[i].text);
     snprintf(place, sizeof place, "%s, line %d: ", motion_path, bad_files[i].line);
-    CHECK(rig_open(&r, motion_path, "") == HAP_ERROR_FORMAT);
-    bool told =
-        strstr(r.detail.text, place) != NULL && strstr(r.detail.text, bad_files[i].why) != NULL;
-    CHECK_SAY(told, "file %zu gave '%s'", i, r.detail.text);
+    CHECK(replay_try(motion_path, "", &detail) == HAP_ERROR_FORMAT);
+    bool told = strstr(detail.text, place) != NULL && strstr(detail.text, bad_files[i].why) != NULL;
+    CHECK_SAY(told, "file %zu gave '%s'", i, detail.text);
   }
 }
 
 TEST(binary_and_endless_lines_are_refused)
 {
-  rig r;
+  hap_detail detail;
   static const char zero_inside[] = "t,x,y,z\n0,1,2,3\n1,2\0,3,4\n";
   file_write_bytes(motion_path, zero_inside, sizeof zero_inside - 1);
-  CHECK(rig_open(&r, motion_path, "") == HAP_ERROR_FORMAT);
-  CHECK(strstr(r.detail.text, "line 3: a zero byte") != NULL);
+  CHECK(replay_try(motion_path, "", &detail) == HAP_ERROR_FORMAT);
+  CHECK(strstr(detail.text, "line 3: a zero byte") != NULL);
   static char large[100000];
   memset(large, '1', sizeof large - 1);
   large[7] = '\n';
@@ -467,18 +418,19 @@ TEST(binary_and_endless_lines_are_refused)
     large[i] = "t,x,y,z"[i];
   }
   file_write(motion_path, large);
-  CHECK(rig_open(&r, motion_path, "") == HAP_ERROR_FORMAT);
-  CHECK(strstr(r.detail.text, "line 2: the line is longer") != NULL);
+  CHECK(replay_try(motion_path, "", &detail) == HAP_ERROR_FORMAT);
+  CHECK(strstr(detail.text, "line 2: the line is longer") != NULL);
 }
 
 TEST(files_that_cannot_be_read)
 {
-  rig r;
+  hap_detail detail;
   const char *path = folder_path("none.csv");
-  CHECK(rig_open(&r, path, "") == HAP_ERROR_IO);
-  CHECK(strstr(r.detail.text, path) != NULL && strstr(r.detail.text, "No such file") != NULL);
-  CHECK(rig_open(&r, test_folder, "") == HAP_ERROR_IO); /* a folder opens, but does not read */
-  CHECK(strstr(r.detail.text, test_folder) != NULL);
+  CHECK(replay_try(path, "", &detail) == HAP_ERROR_IO);
+  CHECK(strstr(detail.text, path) != NULL && strstr(detail.text, "No such file") != NULL);
+  CHECK(replay_try(test_folder, "", &detail) ==
+        HAP_ERROR_IO); /* a folder opens, but does not read */
+  CHECK(strstr(detail.text, test_folder) != NULL);
 }
 
 TEST(bad_specs_say_why)
@@ -496,13 +448,13 @@ TEST(bad_specs_say_why)
                                        {",scale=1,", "key=value"}};
   file_write(motion_path, "t,x,y,z\n0,1,2,3\n");
   for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
-    rig r;
-    CHECK(rig_open(&r, motion_path, bad[i][0]) == HAP_ERROR_ARGUMENT);
-    CHECK(strstr(r.detail.text, bad[i][1]) != NULL);
+    hap_detail detail;
+    CHECK(replay_try(motion_path, bad[i][0], &detail) == HAP_ERROR_ARGUMENT);
+    CHECK(strstr(detail.text, bad[i][1]) != NULL);
   }
-  rig r;
-  CHECK(rig_open(&r, "", "") == HAP_ERROR_ARGUMENT);
-  CHECK(rig_open(&r, "", ",scale=1") == HAP_ERROR_ARGUMENT);
+  hap_detail detail;
+  CHECK(replay_try("", "", &detail) == HAP_ERROR_ARGUMENT);
+  CHECK(replay_try("", ",scale=1", &detail) == HAP_ERROR_ARGUMENT);
 }
 
 /* A locale with a decimal comma, or NULL. */
@@ -525,14 +477,11 @@ TEST(decimal_comma_of_the_locale_is_ignored)
     SKIP("no locale with a decimal comma is installed");
   }
   file_write(motion_path, "t,x,y,z\n0,0.5,2.25,3\n0.5,1.5,2,3\n");
-  rig r;
-  hap_status status = rig_open(&r, motion_path, ",scale=1.5,offset=0.5/0/0");
+  device_rig *r = rig_new_replay(motion_path, ",scale=1.5,offset=0.5/0/0");
   CHECK(strtod("1.5", NULL) == 1.0); /* the locale is still the caller's */
   setlocale(LC_ALL, "C");
-  REQUIRE(status == HAP_OK);
-  rig_read(&r, 0);
-  CHECK(r.pose.position[0] == 1.25 && r.pose.position[1] == 3.375);
-  rig_close(&r);
+  rig_read(r, 0);
+  CHECK(r->pose.position[0] == 1.25 && r->pose.position[1] == 3.375);
 }
 
 TEST(random_damage_never_crashes)
@@ -562,20 +511,21 @@ TEST(random_damage_never_crashes)
     file_write_bytes(
         motion_path, damaged,
         random_share(&state) < 0.1 ? (size_t)(random_share(&state) * (double)size) : size);
-    rig r;
-    hap_status status = rig_open(&r, motion_path, "");
+    hap_detail detail;
+    hap_status status = replay_try(motion_path, "", &detail);
     CHECK(status == HAP_OK || status == HAP_ERROR_FORMAT);
-    CHECK(status == HAP_OK || strstr(r.detail.text, ", line ") != NULL);
+    CHECK(status == HAP_OK || strstr(detail.text, ", line ") != NULL);
     if (status != HAP_OK) {
       continue;
     }
     ++opened;
+    device_rig *r = rig_new_replay(motion_path, "");
     for (int i = 0; i < 60; ++i) {
-      rig_read(&r, i * 7000000LL);
-      CHECK(hapi_finite(r.pose.position, 3) && hapi_finite(r.pose.quat_wxyz, 4));
-      CHECK(hapi_finite(r.twist.linear, 3) && hapi_finite(r.twist.angular, 3));
+      rig_read(r, i * 7000000LL);
+      CHECK(hapi_finite(r->pose.position, 3) && hapi_finite(r->pose.quat_wxyz, 4));
+      CHECK(hapi_finite(r->twist.linear, 3) && hapi_finite(r->twist.angular, 3));
     }
-    rig_close(&r);
+    tap_release(r);
   }
   printf("# %d of 4000 damaged files opened\n", opened);
   CHECK(opened > 200 && opened < 3800); /* both ways were gone */
@@ -591,13 +541,11 @@ TEST(half_a_million_rows_load)
     fprintf(file, "%d.%03d,%d,0,0\n", i / 1000, i % 1000, i);
   }
   fclose(file);
-  rig r;
-  REQUIRE(rig_good(&r, motion_path, ""));
+  device_rig *r = rig_new_replay(motion_path, "");
   for (int i = 0; i < rows; i += 997) {
-    rig_read(&r, i * 1000000LL);
-    CHECK(r.pose.position[0] == (double)i);
+    rig_read(r, i * 1000000LL);
+    CHECK(r->pose.position[0] == (double)i);
   }
-  rig_close(&r);
 }
 
 /* Folder of the shared recordings, or NULL. */
@@ -654,26 +602,24 @@ static bool read_extent(const char *path, extent *out)
 static void check_recording(const char *path)
 {
   extent e = {.rows = 0};
-  rig r;
   REQUIRE(read_extent(path, &e));
-  REQUIRE(rig_good(&r, path, ""));
+  device_rig *r = rig_new_replay(path, "");
   double side = 0.0;
   for (int k = 0; k < 3; ++k) {
     side = fmax(side, e.high[k] - e.low[k]);
   }
   double fastest = 0.0;
   for (int64_t i = 0; i <= (int64_t)(e.last * 1e3); ++i) {
-    hap_pose before = r.pose;
-    rig_read(&r, i * 1000000);
-    fastest = fmax(fastest, hapi_v3_norm(r.twist.linear));
+    hap_pose before = r->pose;
+    rig_read(r, i * 1000000);
+    fastest = fmax(fastest, hapi_v3_norm(r->twist.linear));
     for (int k = 0; k < 3; ++k) {
-      CHECK(r.pose.position[k] >= e.low[k] - 0.01 * side);
-      CHECK(r.pose.position[k] <= e.high[k] + 0.01 * side);
-      CHECK(i == 0 || fabs(r.pose.position[k] - before.position[k]) < 7e-3); /* 7 m/s */
+      CHECK(r->pose.position[k] >= e.low[k] - 0.01 * side);
+      CHECK(r->pose.position[k] <= e.high[k] + 0.01 * side);
+      CHECK(i == 0 || fabs(r->pose.position[k] - before.position[k]) < 7e-3); /* 7 m/s */
     }
   }
   CHECK(fastest > 0.05 && fastest < 7.0);
-  rig_close(&r);
 }
 
 TEST(real_recordings_replay)

@@ -48,10 +48,14 @@ static hapi_spidar_frame command_of(int id, int command)
   return frame;
 }
 
-static bool decode_reply(const board *b, const board_reply *reply, hapi_spidar_frame *out)
+/* What a board answers to a command. */
+static hapi_spidar_frame ask_board(board *b, const hapi_spidar_frame *frame, double *time)
 {
-  return hapi_spidar_decode(reply->bytes, (size_t)reply->size, b->model, HAPI_SPIDAR_FROM_BOARD,
-                            out);
+  hapi_spidar_frame told;
+  board_reply reply = send_to(b, frame, time);
+  REQUIRE(
+      hapi_spidar_decode(reply.bytes, (size_t)reply.size, b->model, HAPI_SPIDAR_FROM_BOARD, &told));
+  return told;
 }
 
 TEST(every_command_of_every_board_has_its_reply)
@@ -83,12 +87,9 @@ TEST(what_a_board_says_it_is)
   board b;
   double time = 0.0;
   hapi_spidar_frame frame = command_of(1, HAPI_SPIDAR_BOARD_INFO);
-  hapi_spidar_frame reply_frame;
   board_init(&b, 1, B5M, 0);
-  board_reply reply = send_to(&b, &frame, &time);
-  REQUIRE(decode_reply(&b, &reply, &reply_frame));
   const uint8_t wanted[6] = {7, 12, 8, 8, 4, 0};
-  CHECK(memcmp(reply_frame.info, wanted, sizeof wanted) == 0);
+  CHECK(memcmp(ask_board(&b, &frame, &time).info, wanted, sizeof wanted) == 0);
 }
 
 TEST(a_reply_tells_what_was_before_its_command)
@@ -98,26 +99,20 @@ TEST(a_reply_tells_what_was_before_its_command)
   int32_t counts[HAPI_SPIDAR_MOTORS] = {5, -7, 1000, 70000};
   hapi_spidar_frame current = command_of(0, HAPI_SPIDAR_CURRENT);
   const hapi_spidar_frame sensor = command_of(0, HAPI_SPIDAR_SENSOR);
-  hapi_spidar_frame told;
   board_init(&b, 0, B3M, 0);
   current.current[2] = 321;
-  board_reply reply = send_to(&b, &current, &time);
-  REQUIRE(decode_reply(&b, &reply, &told));
+  hapi_spidar_frame told = ask_board(&b, &current, &time);
   CHECK(told.position[2] == 0);
-  reply = send_to(&b, &sensor, &time);
-  REQUIRE(decode_reply(&b, &reply, &told));
+  told = ask_board(&b, &sensor, &time);
   CHECK(told.current[2] == 0); /* no control tick yet */
   board_tick(&b, counts);
-  reply = send_to(&b, &sensor, &time);
-  REQUIRE(decode_reply(&b, &reply, &told));
+  told = ask_board(&b, &sensor, &time);
   CHECK(told.current[2] == 321 && told.position[0] == 5 && told.position[1] == -7);
   CHECK(told.position[3] == 70000 - 65536); /* it wraps */
-  reply = send_to(&b, &current, &time);
-  REQUIRE(decode_reply(&b, &reply, &told));
+  told = ask_board(&b, &current, &time);
   CHECK(told.velocity[2] == 1000);
   board_tick(&b, counts);
-  reply = send_to(&b, &current, &time);
-  REQUIRE(decode_reply(&b, &reply, &told));
+  told = ask_board(&b, &current, &time);
   CHECK(told.velocity[2] == 0);
 }
 
@@ -127,17 +122,14 @@ TEST(parameters_are_told_one_call_late)
   double time = 0.0;
   hapi_spidar_frame set = command_of(2, HAPI_SPIDAR_SET_PARAM);
   hapi_spidar_frame get = command_of(2, HAPI_SPIDAR_GET_PARAM);
-  hapi_spidar_frame told;
   board_init(&b, 2, B3M, 0);
   set.parameter_type = HAPI_SPIDAR_PARAMETER_CURRENT_GAIN;
   set.parameter[3] = 77;
   (void)send_to(&b, &set, &time);
   get.parameter_type = HAPI_SPIDAR_PARAMETER_CURRENT_GAIN;
-  board_reply reply = send_to(&b, &get, &time);
-  REQUIRE(decode_reply(&b, &reply, &told));
+  hapi_spidar_frame told = ask_board(&b, &get, &time);
   CHECK(told.parameter_type == HAPI_SPIDAR_PARAMETER_PD);
-  reply = send_to(&b, &get, &time);
-  REQUIRE(decode_reply(&b, &reply, &told));
+  told = ask_board(&b, &get, &time);
   CHECK(told.parameter_type == HAPI_SPIDAR_PARAMETER_CURRENT_GAIN && told.parameter[3] == 77);
 }
 
@@ -256,17 +248,17 @@ static void stage_flush(void *self)
   (void)stage_receive(self, bytes, sizeof bytes);
 }
 
-static stage the_stage; /* large */
+static void stage_end(void *owned)
+{
+  stage *s = owned;
+  emulator_finish(&s->emulator);
+}
 
 static stage *set_stage(const emulator_def *def)
 {
-  stage *s = &the_stage;
+  stage *s = tap_own(sizeof *s, stage_end);
   hap_detail detail = {""};
-  memset(s, 0, sizeof *s);
-  if (emulator_init(&s->emulator, def, &detail) < HAP_OK) {
-    printf("# %s\n", detail.text);
-    return NULL;
-  }
+  REQUIRE_SAY(emulator_init(&s->emulator, def, &detail) == HAP_OK, "%s", detail.text);
   s->port = (hapi_spidar_port){s, stage_send, stage_receive, stage_await, stage_now, stage_flush};
   return s;
 }
@@ -308,13 +300,11 @@ TEST(all_ids_and_models_are_found)
     stage *s = set_stage(&def);
     hapi_spidar_boards found;
     hap_detail detail = {""};
-    REQUIRE(s != NULL);
     CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_OK);
     REQUIRE(found.count == rows[i].count);
     for (int k = 0; k < found.count; ++k) {
       CHECK(found.id[k] == rows[i].ids[k] && found.model[k] == rows[i].boards[k]);
     }
-    emulator_finish(&s->emulator);
   }
 }
 
@@ -324,7 +314,6 @@ TEST(boards_are_found_among_garbage)
   hapi_spidar_boards found;
   hap_detail detail = {""};
   stage *s = set_stage(&def);
-  REQUIRE(s != NULL);
   stage_tell(s, "garbage 300");
   CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_OK && found.count == 2);
   for (int lost = 0; lost < 14; ++lost) { /* one answer with a byte missing */
@@ -332,7 +321,6 @@ TEST(boards_are_found_among_garbage)
     REQUIRE(wire_add_fault(&s->emulator.wire, &fault));
     CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_OK && found.count == 2);
   }
-  emulator_finish(&s->emulator);
 }
 
 TEST(who_is_not_there_is_not_found)
@@ -341,7 +329,6 @@ TEST(who_is_not_there_is_not_found)
   hapi_spidar_boards found;
   hap_detail detail = {""};
   stage *s = set_stage(&def);
-  REQUIRE(s != NULL);
   stage_tell(s, "silent 1 1");
   CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_OK);
   CHECK(found.count == 1 && found.id[0] == 0);
@@ -355,17 +342,18 @@ TEST(who_is_not_there_is_not_found)
   stage_tell(s, "unplug");
   CHECK(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_ERROR_DEVICE);
   CHECK(strstr(detail.text, "port failed") != NULL);
-  emulator_finish(&s->emulator);
 }
 
 /* ---- cycles ---- */
 
-static bool stage_begin(stage *s, hapi_spidar_line *line)
+static stage *stage_begin(const emulator_def *def, hapi_spidar_line *line)
 {
   hapi_spidar_boards found;
   hap_detail detail = {""};
-  return s != NULL && hapi_spidar_line_find(&s->port, &found, &detail) == HAP_OK &&
-         hapi_spidar_line_begin(line, &s->port, &found, STEP_RATE) == HAP_OK;
+  stage *s = set_stage(def);
+  REQUIRE(hapi_spidar_line_find(&s->port, &found, &detail) == HAP_OK);
+  REQUIRE(hapi_spidar_line_begin(line, &s->port, &found, STEP_RATE) == HAP_OK);
+  return s;
 }
 
 /* A tick: takes what came, asks anew. */
@@ -398,11 +386,10 @@ TEST(cycles_are_answered_and_wrap)
 {
   const emulator_def def = x4r_of(EMULATOR_HAND_PUSH);
   hapi_spidar_line line;
-  stage *s = set_stage(&def);
   int taken = 0;
   int32_t least = INT32_MAX;
   int32_t most = INT32_MIN;
-  REQUIRE(stage_begin(s, &line));
+  stage *s = stage_begin(&def, &line);
   (void)stage_tick(s, &line, taut);
   for (int i = 0; i < 3000; ++i) {
     taken += stage_tick(s, &line, taut);
@@ -415,15 +402,13 @@ TEST(cycles_are_answered_and_wrap)
   CHECK(taken == 3000);
   CHECK(most > 32767 && least < 32600); /* across the wrap */
   CHECK(s->emulator.wire.collisions == 0);
-  emulator_finish(&s->emulator);
 }
 
 TEST(short_padding_lets_replies_collide)
 {
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   hapi_spidar_line line;
-  stage *s = set_stage(&def);
-  REQUIRE(stage_begin(s, &line));
+  stage *s = stage_begin(&def, &line);
   uint8_t bytes[HAPI_SPIDAR_COMMANDS_MAX];
   (void)hapi_spidar_cycle_commands(&line.cycle, taut, bytes);
   memmove(bytes + 9, bytes + 37, 37); /* no zeros between the two */
@@ -433,7 +418,6 @@ TEST(short_padding_lets_replies_collide)
   CHECK(hapi_spidar_line_receive(&line) == 0);
   (void)stage_tick(s, &line, taut);
   CHECK(stage_tick(s, &line, taut) && is_right(s, &line));
-  emulator_finish(&s->emulator);
 }
 
 /* ---- wrong bytes, at every place of a cycle ---- */
@@ -460,11 +444,7 @@ static outcome spoil_all(const emulator_def *def, wire_fault fault, const int16_
 {
   outcome all = {0, 0, 0};
   hapi_spidar_line line;
-  stage *s = set_stage(def);
-  if (!stage_begin(s, &line)) {
-    all.slow = -1;
-    return all;
-  }
+  stage *s = stage_begin(def, &line);
   for (int i = 0; i < 400; ++i) { /* the strings are wound in */
     (void)stage_tick(s, &line, currents);
   }
@@ -476,12 +456,9 @@ static outcome spoil_all(const emulator_def *def, wire_fault fault, const int16_
   }
   for (int place = 0; place < (to ? commands : line.cycle.length); ++place) {
     fault.skip = (unsigned)place;
-    if (!wire_add_fault(&s->emulator.wire, &fault)) {
-      all.slow = -1;
-    }
+    REQUIRE(wire_add_fault(&s->emulator.wire, &fault));
     look_after(s, &line, currents, &all);
   }
-  emulator_finish(&s->emulator);
   return all;
 }
 
@@ -543,8 +520,7 @@ TEST(late_replies_are_taken_when_they_come)
 {
   const emulator_def def = x4r_of(EMULATOR_HAND_PUSH);
   hapi_spidar_line line;
-  stage *s = set_stage(&def);
-  REQUIRE(stage_begin(s, &line));
+  stage *s = stage_begin(&def, &line);
   (void)stage_tick(s, &line, taut);
   stage_tell(s, "late 0.0033");
   int taken = 0;
@@ -553,15 +529,13 @@ TEST(late_replies_are_taken_when_they_come)
     CHECK(is_right(s, &line));
   }
   CHECK(taken >= 95);
-  emulator_finish(&s->emulator);
 }
 
 TEST(silence_is_measured)
 {
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   hapi_spidar_line line;
-  stage *s = set_stage(&def);
-  REQUIRE(stage_begin(s, &line));
+  stage *s = stage_begin(&def, &line);
   (void)stage_tick(s, &line, taut);
   CHECK(stage_tick(s, &line, taut));
   CHECK(hapi_spidar_line_silence(&line) <= 1e-9);
@@ -582,7 +556,6 @@ TEST(silence_is_measured)
   CHECK(hapi_spidar_line_exchange(&line, taut, 0.1) == HAP_ERROR_TIMEOUT);
   stage_tell(s, "unplug");
   CHECK(hapi_spidar_line_exchange(&line, taut, 0.1) == HAP_ERROR_DEVICE);
-  emulator_finish(&s->emulator);
 }
 
 /* Five of them are 5 ms. */
@@ -591,8 +564,7 @@ TEST(a_pulled_cable_is_noticed_by_the_next_tick)
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   hapi_spidar_line line;
   for (int part = 0; part < 10; ++part) {
-    stage *s = set_stage(&def);
-    REQUIRE(stage_begin(s, &line));
+    stage *s = stage_begin(&def, &line);
     (void)stage_tick(s, &line, taut);
     CHECK(stage_tick(s, &line, taut));
     s->now += 1e-4 * part; /* answers are under way, or all there */
@@ -600,7 +572,6 @@ TEST(a_pulled_cable_is_noticed_by_the_next_tick)
     s->now += CYCLE_S;
     CHECK(hapi_spidar_line_receive(&line) == -EIO);
     CHECK(hapi_spidar_line_send(&line, taut) == -EIO);
-    emulator_finish(&s->emulator);
   }
 }
 
@@ -610,8 +581,7 @@ TEST(a_command_that_was_cut_is_ended_by_zeros)
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   hapi_spidar_line line;
   uint8_t bytes[HAPI_SPIDAR_COMMANDS_MAX];
-  stage *s = set_stage(&def);
-  REQUIRE(stage_begin(s, &line));
+  stage *s = stage_begin(&def, &line);
   (void)stage_tick(s, &line, taut);
   for (int part = 1; part < 74; ++part) {
     REQUIRE(stage_tick(s, &line, taut));
@@ -627,15 +597,13 @@ TEST(a_command_that_was_cut_is_ended_by_zeros)
     (void)stage_tick(s, &line, taut);
     CHECK(stage_tick(s, &line, taut) && is_right(s, &line) && !line.cut);
   }
-  emulator_finish(&s->emulator);
 }
 
 TEST(positions_that_jump_are_not_believed)
 {
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   hapi_spidar_line line;
-  stage *s = set_stage(&def);
-  REQUIRE(stage_begin(s, &line));
+  stage *s = stage_begin(&def, &line);
   (void)stage_tick(s, &line, taut);
   CHECK(stage_tick(s, &line, taut));
   s->emulator.wire.boards[1].origin[2] = 5000; /* a RESET_SENSOR that nobody sent */
@@ -645,7 +613,6 @@ TEST(positions_that_jump_are_not_believed)
     CHECK(!stage_tick(s, &line, taut));
   }
   CHECK(line.bad_steps >= 5 && abs(line.counts.counts[6] - before) < 5);
-  emulator_finish(&s->emulator);
 }
 
 /* ---- mechanics ---- */
@@ -659,13 +626,12 @@ static void model_feel(const char *name, int model, const hap_wrench *wanted)
                       .board_model = {model, model},
                       .board_id = {0, 1},
                       .hand = EMULATOR_HAND_HOLD};
-  stage *s = set_stage(&def);
   hapi_spidar_line line;
   hapi_spidar_tensions solver;
   hap_wrench reached;
   double tension[HAPI_SPIDAR_STRINGS_MAX];
   int16_t currents[8];
-  REQUIRE(stage_begin(s, &line));
+  stage *s = stage_begin(&def, &line);
   hapi_spidar_tensions_init(&solver, m);
   for (int i = 0; i < 2500; ++i) {
     const hap_pose *pose = &s->emulator.grip.pose;
@@ -684,7 +650,6 @@ static void model_feel(const char *name, int model, const hap_wrench *wanted)
     CHECK_NEAR(g->wrench.torque[k], reached.torque[k], 1.5e-3);
     CHECK_NEAR(g->pose.position[k], reached.force[k] / 150.0, 5e-4); /* the hand's spring */
   }
-  emulator_finish(&s->emulator);
 }
 
 TEST(what_is_asked_for_is_felt)
@@ -700,13 +665,11 @@ TEST(nobody_holds_it_and_nobody_pulls)
 {
   const emulator_def def = x4r_of(EMULATOR_HAND_NONE);
   stage *s = set_stage(&def);
-  REQUIRE(s != NULL);
   emulator_advance(&s->emulator, 0.5);
   CHECK(hapi_v3_norm(s->emulator.grip.pose.position) < 1e-9);
   stage_tell(s, "push 0.2 0 0"); /* against slack rotors alone */
   emulator_advance(&s->emulator, 0.55);
   CHECK(s->emulator.grip.pose.position[0] > 1e-4);
-  emulator_finish(&s->emulator);
 }
 
 /* ---- commands ---- */
@@ -762,7 +725,6 @@ TEST(commands_are_understood_or_refused)
   stage *s = set_stage(&def);
   emulator_action action;
   hap_detail detail = {""};
-  REQUIRE(s != NULL);
   for (size_t i = 0; i < sizeof good_commands / sizeof good_commands[0]; ++i) {
     bool taken = emulator_parse(&s->emulator, good_commands[i], &action, &detail) == HAP_OK;
     CHECK_SAY(taken, "%s", good_commands[i]);
@@ -772,7 +734,6 @@ TEST(commands_are_understood_or_refused)
         emulator_parse(&s->emulator, bad_commands[i], &action, &detail) == HAP_ERROR_FORMAT;
     CHECK_SAY(refused, "%s", bad_commands[i]);
   }
-  emulator_finish(&s->emulator);
 }
 
 TEST(a_script_is_followed)
@@ -780,7 +741,6 @@ TEST(a_script_is_followed)
   const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
   stage *s = set_stage(&def);
   hap_detail detail = {""};
-  REQUIRE(s != NULL);
   CHECK(emulator_plan_line(&s->emulator, "# nothing", &detail) == HAP_OK);
   CHECK(emulator_plan_line(&s->emulator, "", &detail) == HAP_OK);
   CHECK(emulator_plan_line(&s->emulator, "0.1 unplug 0.05", &detail) == HAP_OK);
@@ -796,18 +756,17 @@ TEST(a_script_is_followed)
   CHECK(s->emulator.plugged && !s->emulator.wire.silent[0]);
   emulator_advance(&s->emulator, 0.21);
   CHECK(s->emulator.wire.silent[0] && !s->emulator.wire.silent[1]);
-  emulator_finish(&s->emulator);
 }
 
 TEST(a_wrong_emulator_is_refused)
 {
   hap_detail detail = {""};
   emulator_def def = x4r_of(EMULATOR_HAND_PUSH);
-  stage *s = &the_stage;
+  static emulator wrong;
   def.board_count = 1;
-  CHECK(emulator_init(&s->emulator, &def, &detail) == HAP_ERROR_ARGUMENT);
+  CHECK(emulator_init(&wrong, &def, &detail) == HAP_ERROR_ARGUMENT);
   CHECK(strstr(detail.text, "4 motors") != NULL && strstr(detail.text, "8 strings") != NULL);
   def = x4r_of(EMULATOR_HAND_PUSH);
   def.path = "0:0/0/0;1:1/1";
-  CHECK(emulator_init(&s->emulator, &def, &detail) == HAP_ERROR_ARGUMENT);
+  CHECK(emulator_init(&wrong, &def, &detail) == HAP_ERROR_ARGUMENT);
 }

@@ -9,21 +9,18 @@
  * the loop's newest message. Those who draw look bodies up in the table, so that it changes
  * under the lock of the drawing. */
 
-static bool listener_grow(void *user, uint32_t capacity)
+static bool listener_grow(hapi_physics *physics, uint32_t capacity)
 {
-  hapi_physics *physics = user;
   return hapi_poses_grow(&physics->drawing, capacity);
 }
 
-static void listener_body_begun(void *user, uint32_t index)
+static void listener_body_begun(hapi_physics *physics, uint32_t index)
 {
-  hapi_physics *physics = user;
   hapi_poses_begin(&physics->drawing, &physics->world.bodies.entries[index], index);
 }
 
-static void listener_body_gone(void *user, uint32_t index)
+static void listener_body_gone(hapi_physics *physics, uint32_t index)
 {
-  hapi_physics *physics = user;
   HAPI_ASSERT_INDEX(index, physics->world.bodies.high);
   hapi_slots_drop_body(&physics->near, index);
   for (uint32_t i = 0; i < physics->watch.count; ++i) {
@@ -33,16 +30,15 @@ static void listener_body_gone(void *user, uint32_t index)
   }
 }
 
-static void listener_surface_asked(void *user, dGeomID a, dGeomID b,
+static void listener_surface_asked(hapi_physics *physics, dGeomID a, dGeomID b,
                                    const dSurfaceParameters *surface)
 {
-  hapi_physics *physics = user;
   hapi_lookback_ask(&physics->lookback, a, b, surface);
 }
 
 void hapi_physics_listen(hapi_physics *physics)
 {
-  physics->listener = (hapi_world_listener){.user = physics,
+  physics->listener = (hapi_world_listener){.physics = physics,
                                             .grow = listener_grow,
                                             .body_begun = listener_body_begun,
                                             .body_gone = listener_body_gone,

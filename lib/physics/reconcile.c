@@ -11,7 +11,7 @@
 /* Where the loop's world and the global world meet (paper section 6,
  * docs/decisions/step-ends-now.md). */
 
-bool hapi_account_create(hapi_account *account, const hapi_cycle *cycle, const hapi_world *world,
+bool hapi_account_create(hapi_account *account, const hapi_cycle *cycle, hapi_world *world,
                          const hapi_slots *slots)
 {
   uint32_t capacity = cycle->config->capacity.bodies;
@@ -141,9 +141,8 @@ static void take_body(hapi_account *account, uint32_t index)
   take_impulse(of, slot, in);
   slot->loop_owned = (in->flags & HAPI_BODY_OWNED) != 0 && in->epoch == slot->epoch;
   if (slot->loop_owned) {
-    HAPI_ASSERT_INDEX(slot->known, account->world->bodies.high);
-    account->world->bodies.entries[slot->known].loop_owned = true;
-    account->world->bodies.entries[slot->known].loop_touched = (in->flags & HAPI_BODY_TOUCHED) != 0;
+    hapi_bodies_own(&account->world->bodies, slot->known, true,
+                    (in->flags & HAPI_BODY_TOUCHED) != 0);
   }
   memcpy(slot->gain_taken, in->gain, sizeof slot->gain_taken);
   if (moved_by_application(of, slot, body)) {

@@ -45,16 +45,16 @@ typedef struct hapi_account_counts {
 typedef struct hapi_account {
   /* What it reads. */
   const hapi_cycle *cycle;
-  const hapi_world *world;
   const hapi_slots *slots;
 
+  hapi_world *world;         /* the account says which of its bodies are the loop's */
   hapi_slot_account *bodies; /* by slot */
   uint32_t capacity;
   hapi_account_counts counts;
 } hapi_account;
 
-/* What is read outlives it. False: no memory. */
-bool hapi_account_create(hapi_account *account, const hapi_cycle *cycle, const hapi_world *world,
+/* World and what is read outlive it. False: no memory. */
+bool hapi_account_create(hapi_account *account, const hapi_cycle *cycle, hapi_world *world,
                          const hapi_slots *slots);
 void hapi_account_finish(hapi_account *account);
 void hapi_account_reset(hapi_account *account); /* all slots begin anew */

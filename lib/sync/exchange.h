@@ -78,8 +78,6 @@ void hapi_exchange_near_ring(hapi_exchange *exchange); /* [any] ends such a wait
 
 /* ---- recordings ---- */
 
-#define HAPI_EXCHANGE_NEWEST UINT64_MAX
-
 /* Messages of a channel are counted from 1. [reader] number of the message held, 0: none yet. */
 uint64_t hapi_exchange_taken(const hapi_exchange *exchange, hapi_channel name);
 /* [writer] how many there were */

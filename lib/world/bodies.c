@@ -22,7 +22,7 @@ static hap_status table_grow(hapi_body_table *table, uint32_t capacity)
 {
   const hapi_world_listener *listener = table->listener;
   if (!hapi_index_reserve(&table->by_address, capacity) ||
-      !listener->grow(listener->user, capacity)) {
+      !listener->grow(listener->physics, capacity)) {
     return HAP_ERROR_MEMORY;
   }
   hapi_known_body *entries = hapi_alloc_array(capacity, sizeof *entries);
@@ -114,11 +114,18 @@ static void drop_entry(hapi_body_table *table, uint32_t index)
 {
   HAPI_ASSERT_INDEX(index, table->high);
   hapi_known_body *known = &table->entries[index];
-  table->listener->body_gone(table->listener->user, index);
+  table->listener->body_gone(table->listener->physics, index);
   hapi_free(known->rest->sleep.velocities);
   memset(known->rest, 0, sizeof *known->rest);
   *known = (hapi_known_body){.rest = known->rest};
   known->slot = HAPI_NONE;
+}
+
+void hapi_bodies_own(hapi_body_table *table, uint32_t index, bool loop_owned, bool loop_touched)
+{
+  HAPI_ASSERT_INDEX(index, table->high);
+  table->entries[index].loop_owned = loop_owned;
+  table->entries[index].loop_touched = loop_touched;
 }
 
 /* Where another body has come to be at the address of a destroyed one, the entry begins anew. */
@@ -130,7 +137,7 @@ static void follow_life(hapi_body_table *table, uint32_t index)
     dBodyID body = known->body;
     drop_entry(table, index);
     begin_entry(table, known, body);
-    table->listener->body_begun(table->listener->user, index);
+    table->listener->body_begun(table->listener->physics, index);
     ++table->replaced;
   }
 }
@@ -218,7 +225,7 @@ static bool see_body(hapi_world *world, dBodyID body)
     if (table->starved) {
       return false;
     }
-    table->listener->body_begun(table->listener->user, index);
+    table->listener->body_begun(table->listener->physics, index);
   }
   table->last_seen = index;
   hapi_known_body *known = &table->entries[index];
@@ -360,7 +367,7 @@ hap_status hapi_bodies_adopt(hapi_body_table *table, dBodyID body)
     if (entry_add(table, body, &index) < HAP_OK) {
       return HAP_ERROR_MEMORY;
     }
-    table->listener->body_begun(table->listener->user, index);
+    table->listener->body_begun(table->listener->physics, index);
   }
   table->entries[index].rest->adopted = true;
   table->entries[index].found = false; /* its geoms may have gone since */

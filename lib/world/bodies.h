@@ -77,15 +77,18 @@ typedef struct hapi_known_body {
   uint16_t still; /* cycles in a row in which it was at rest, up to HAPI_STILL_MOST; 0: it is new */
 } hapi_known_body;
 
+struct hapi_physics;
+
 /* What other parts want to hear of the world. Called under the lock that the caller of the world's
  * function has. */
 typedef struct hapi_world_listener {
-  void *user;
+  struct hapi_physics *physics; /* nothing here looks into it */
   /* Before the table grows: arrays by entry. False: no memory. */
-  bool (*grow)(void *user, uint32_t capacity);
-  void (*body_begun)(void *user, uint32_t index);
-  void (*body_gone)(void *user, uint32_t index); /* its entry still holds it */
-  void (*surface_asked)(void *user, dGeomID a, dGeomID b, const dSurfaceParameters *surface);
+  bool (*grow)(struct hapi_physics *physics, uint32_t capacity);
+  void (*body_begun)(struct hapi_physics *physics, uint32_t index);
+  void (*body_gone)(struct hapi_physics *physics, uint32_t index); /* its entry still holds it */
+  void (*surface_asked)(struct hapi_physics *physics, dGeomID a, dGeomID b,
+                        const dSurfaceParameters *surface);
 } hapi_world_listener;
 
 /* The first ones that the scan met; NULL: none. Not of the local bodies. */
@@ -126,6 +129,8 @@ uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_N
 hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle);
 hap_status hapi_bodies_adopt(hapi_body_table *table, dBodyID body);
 hap_status hapi_bodies_forget(hapi_body_table *table, dBodyID body);
+/* Whose the body of an entry is: the loop's, which touched it, or ODE's. */
+void hapi_bodies_own(hapi_body_table *table, uint32_t index, bool loop_owned, bool loop_touched);
 hap_status hapi_bodies_set_moved_callback(hapi_world *world, const hapi_cycle *cycle, dBodyID body,
                                           void (*callback)(dBodyID));
 

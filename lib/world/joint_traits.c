@@ -5,7 +5,14 @@
 #include <stddef.h>
 
 /* All that ODE's kinds of joints differ in. A transmission and a contact are not here, nor is
- * Plane2D, which has no getters. */
+ * Plane2D, which has no getters.
+ *
+ * To add a joint, add a row here. Without rows of its own in the loop (NOT_CARRIED, or no row at
+ * all) that is everything: testing simulations find its equations. For rows of its own give it a
+ * kind in sync/model.h. The compiler then names each switch that lacks the kind, in
+ * world/joint_place.c (where the joint is in its bodies) and local/joint_rows.c (its rows). What
+ * it does not name are comparisons with HAPI_JOINT_SLIDER, whose axis is a way and not a turn:
+ * in those two files and in physics/publish.c. */
 
 #define OF(J) dJointType##J, dJointGet##J##Param, dJointSet##J##Param
 #define NOT_CARRIED HAPI_JOINT_MEASURED

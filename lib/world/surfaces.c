@@ -78,7 +78,7 @@ static bool ask_application(const hapi_world *world, const hapi_cycle *cycle, dG
                           "softness or slip below 0: the pair has no contact");
     return false;
   }
-  world->bodies.listener->surface_asked(world->bodies.listener->user, a, b, out);
+  world->bodies.listener->surface_asked(world->bodies.listener->physics, a, b, out);
   return true;
 }
 
