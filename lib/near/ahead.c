@@ -1,5 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include "near/ahead.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -7,6 +9,7 @@
 
 #include "base/alloc.h"
 #include "base/assert.h"
+#include "base/clock.h"
 #include "base/vec.h"
 #include "near/near.h"
 
@@ -129,7 +132,7 @@ static int comer_by_arrival(const void *a, const void *b)
 static bool island_add(hapi_nearby *nearby, uint32_t known)
 {
   hapi_range *range = &nearby->range;
-  hapi_ahead *ahead = &range->ahead;
+  hapi_ahead *ahead = &nearby->range.ahead;
   hapi_visit *visit = &nearby->visits[known];
   if (visit->island_in == range->number) {
     return true;
@@ -184,7 +187,7 @@ static bool island_add_links(hapi_nearby *nearby, uint32_t known, hapi_range_nee
 static bool tick_has_room(const hapi_nearby *nearby)
 {
   const hapi_range *range = &nearby->range;
-  uint32_t rows = ROWS_PER_PAIR * (range->near->pair_count + range->ahead.half_pairs / 2) +
+  uint32_t rows = ROWS_PER_PAIR * (range->near->pair_count + nearby->range.ahead.half_pairs / 2) +
                   ROWS_PER_JOINT * range->mechanism.joint_count;
   return rows <= nearby->cycle->settings.row_updates / UPDATES_PER_ROW;
 }
@@ -193,8 +196,8 @@ static bool tick_has_room(const hapi_nearby *nearby)
 static void island_leave(hapi_nearby *nearby, uint32_t joints_before, bool fits)
 {
   hapi_range *range = &nearby->range;
-  for (uint32_t i = 0; i < range->ahead.island_count; ++i) {
-    hapi_visit *visit = &nearby->visits[range->ahead.island[i]];
+  for (uint32_t i = 0; i < nearby->range.ahead.island_count; ++i) {
+    hapi_visit *visit = &nearby->visits[nearby->range.ahead.island[i]];
     visit->gathered_in = fits ? 0 : visit->gathered_in;
     visit->refused_in = fits ? 0 : range->number;
   }
@@ -209,20 +212,20 @@ static bool island_fits(hapi_nearby *nearby, uint32_t known)
   hapi_range *range = &nearby->range;
   hapi_range_need need = {0, 0, 0};
   uint32_t joints_before = range->mechanism.joint_count;
-  range->ahead.island_count = range->ahead.half_pairs = 0;
+  nearby->range.ahead.island_count = nearby->range.ahead.half_pairs = 0;
   bool fits = island_add(nearby, known);
-  for (uint32_t i = 0; fits && i < range->ahead.island_count; ++i) {
-    fits = island_add_mechanism(nearby, range->ahead.island[i]) &&
-           island_add_links(nearby, range->ahead.island[i], &need) && tick_has_room(nearby);
+  for (uint32_t i = 0; fits && i < nearby->range.ahead.island_count; ++i) {
+    fits = island_add_mechanism(nearby, nearby->range.ahead.island[i]) &&
+           island_add_links(nearby, nearby->range.ahead.island[i], &need) && tick_has_room(nearby);
   }
   island_leave(nearby, joints_before, fits);
   return fits;
 }
 
-void hapi_ahead_walk(hapi_nearby *nearby)
+static void ahead_walk(hapi_nearby *nearby)
 {
   hapi_range *range = &nearby->range;
-  hapi_ahead *ahead = &range->ahead;
+  hapi_ahead *ahead = &nearby->range.ahead;
   ahead->count = 0;
   if (hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_RANGE) ||
       nearby->cycle->settings.range_hops != HAP_RANGE_ALL ||
@@ -240,4 +243,16 @@ void hapi_ahead_walk(hapi_nearby *nearby)
       return;
     }
   }
+}
+
+void hapi_ahead_range(hapi_nearby *nearby, uint32_t hit_count)
+{
+  if (nearby->cycle->model != HAP_MODEL_CONTACT || nearby->cycle->state == NULL) {
+    return;
+  }
+  hapi_range_walk(nearby, hit_count);
+  int64_t begin_ns = hapi_clock_now();
+  ahead_walk(nearby);
+  nearby->counts.beyond_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+  hapi_range_end(nearby, hit_count);
 }

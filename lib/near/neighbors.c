@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "base/pose.h"
 #include "base/vec.h"
+#include "near/ahead.h"
 #include "near/near.h"
 #include "proximity/constrained_ball.h"
 
@@ -581,7 +582,7 @@ void hapi_neighbors_find(hapi_nearby *nearby)
     take_hit(nearby, &hood->hits[i]);
   }
   int64_t begin_ns = hapi_clock_now();
-  hapi_range_walk(nearby, count);
+  hapi_ahead_range(nearby, count);
   nearby->counts.last_range_s =
       1e-9 * (double)(hapi_clock_now() - begin_ns) - nearby->range.links.cover.boxes_s;
   nearby->counts.range_s += nearby->counts.last_range_s;

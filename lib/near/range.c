@@ -674,9 +674,6 @@ static void range_expand_further(hapi_nearby *nearby)
 
 void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
 {
-  if (nearby->cycle->model != HAP_MODEL_CONTACT || nearby->cycle->state == NULL) {
-    return;
-  }
   hapi_range *range = &nearby->range;
   range->near = hapi_exchange_near_back(nearby->cycle->config->exchange);
   range->near->body_count = 0;
@@ -715,7 +712,13 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
   for (uint32_t next = range->seeds; next < range->count; ++next) {
     range_expand(nearby, range->queue[next], false);
   }
-  hapi_ahead_walk(nearby);
+  nearby->counts.beyond_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+}
+
+void hapi_range_end(hapi_nearby *nearby, uint32_t hit_count)
+{
+  const hapi_range *range = &nearby->range;
+  int64_t begin_ns = hapi_clock_now();
   if (range->seeds > 0 && !range->refused &&
       hapi_wish_is_on(nearby->cycle->wishes, HAP_EFFECT_RANGE)) {
     range_expand_further(nearby);

@@ -50,7 +50,7 @@ typedef struct hapi_mechanism {
   uint32_t joint_count;
 } hapi_mechanism;
 
-/* A body that may come to a pointer by itself. */
+/* What looking ahead goes through: near/ahead.c. */
 typedef struct hapi_comer {
   uint32_t known;   /* entry of the body table */
   double arrival_s; /* from now on, at the earliest; HUGE_VAL: a mechanism that ODE does not hold */
@@ -95,7 +95,9 @@ typedef struct hapi_range {
 bool hapi_range_create(hapi_nearby *nearby);
 void hapi_range_finish(hapi_nearby *nearby);
 void hapi_range_reset(hapi_nearby *nearby);
+/* A new walk: from the neighbours on, all that may touch. */
 void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count);
+void hapi_range_end(hapi_nearby *nearby, uint32_t hit_count); /* what else the wishes ask for */
 void hapi_range_publish(hapi_nearby *nearby); /* with the model of the same number */
 
 /* What is near the body: range.links. */
@@ -105,9 +107,6 @@ void hapi_range_links(hapi_nearby *nearby, const hapi_known_body *known);
 bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_range_need *io);
 /* The body, and from it on all that may touch; false: there is no room for it. */
 bool hapi_range_follow(hapi_nearby *nearby, uint32_t known);
-
-/* ahead.c */
-void hapi_ahead_walk(hapi_nearby *nearby); /* after all that the neighbours lead to */
 
 /* mechanism.c */
 /* The bodies that joints tie to this one, itself first, into range.mechanism, and their joints
