@@ -69,15 +69,6 @@ static inline dJointID add_slider(mechanism *m, dBodyID a, dBodyID b, const doub
 
 /* ---- runs ---- */
 
-static inline void open_mechanism(mechanism *m, build_fn build, double gravity)
-{
-  memset(m, 0, sizeof *m);
-  cw_open(&m->w, gravity);
-  m->w.def.physics_hz = 1.0 / (STEP_TICKS * PERIOD);
-  dWorldSetCFM(m->w.world, 1e-10);
-  build(m);
-}
-
 static inline void start_mechanism(mechanism *m)
 {
   cw_start_following(&m->w, 0.0, 0.0, BALL + m->w.hand_def.radius + NEAR);
@@ -92,7 +83,10 @@ static inline void mechanism_owned(void *owned)
 static inline mechanism *mechanism_new(build_fn build, double gravity)
 {
   mechanism *m = tap_own(sizeof *m, mechanism_owned);
-  open_mechanism(m, build, gravity);
+  cw_open(&m->w, gravity);
+  m->w.def.physics_hz = 1.0 / (STEP_TICKS * PERIOD);
+  dWorldSetCFM(m->w.world, 1e-10);
+  build(m);
   return m;
 }
 
@@ -102,12 +96,6 @@ static inline mechanism *mechanism_running(build_fn build, double gravity)
   mechanism *m = mechanism_new(build, gravity);
   start_mechanism(m);
   return m;
-}
-
-static inline void mechanism_begin(mechanism *m, build_fn build, double gravity)
-{
-  open_mechanism(m, build, gravity);
-  start_mechanism(m);
 }
 
 /* Both anchors of a joint, as ODE has them; false: the joint has none. */
@@ -151,6 +139,45 @@ static inline double turn_between(dBodyID a, dBodyID b)
   const dReal *q = dBodyGetQuaternion(b);
   double dot = fabs(p[0] * q[0] + p[1] * q[1] + p[2] * q[2] + p[3] * q[3]);
   return 2.0 * acos(fmin(dot, 1.0));
+}
+
+typedef struct mechanism_difference {
+  double way;  /* m, of the centres */
+  double turn; /* rad, at the end */
+  double open; /* m, of the loop's joints at the syncs */
+} mechanism_difference;
+
+/* The loop against ODE's exact solver at the rate of the loop. The last tick of a step is in ODE
+ * with the next one. */
+static inline mechanism_difference mechanisms_compare(mechanism *loop, mechanism *ode,
+                                                      double seconds)
+{
+  mechanism_difference out = {0.0, 0.0, 0.0};
+  int ticks = STEP_TICKS * (int)lround(seconds / (STEP_TICKS * PERIOD));
+  for (int t = 1; t <= ticks; ++t) {
+    dWorldStep(ode->w.world, PERIOD);
+    cw_tick(&loop->w);
+    for (int i = 0; i < loop->w.body_count; ++i) {
+      const dReal *p = dBodyGetPosition(ode->w.bodies[i]);
+      const double *q = loop->w.position[i];
+      out.way = fmax(out.way, cw_norm(AT(p[0] - q[0], p[1] - q[1], p[2] - q[2])));
+    }
+    out.open = t % STEP_TICKS == 0 ? fmax(out.open, mechanism_openness(loop)) : out.open;
+  }
+  cw_tick(&loop->w); /* with its sync */
+  for (int i = 0; i < loop->w.body_count; ++i) {
+    out.turn = fmax(out.turn, turn_between(loop->w.bodies[i], ode->w.bodies[i]));
+  }
+  return out;
+}
+
+static inline uint32_t moving_bodies(const mechanism *m)
+{
+  uint32_t moving = 0;
+  for (int i = 0; i < m->w.body_count; ++i) {
+    moving += dBodyIsKinematic(m->w.bodies[i]) == 0;
+  }
+  return moving;
 }
 
 /* The loop owns all of it, and nothing is probed. */

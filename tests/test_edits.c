@@ -393,20 +393,18 @@ TEST(the_loop_does_not_wait_for_the_lock)
 {
   const hap_drive drives[] = {HAP_DRIVE_THREADS, HAP_DRIVE_FRAME};
   for (int d = 0; d < 2; ++d) {
-    stage s;
-    stage_run(&s, drives[d]);
-    hap_pointer_id hand = add_hand(&s, -0.058);
-    CHECK(ticks_go_on(&s));
-    CHECK(hap_session_lock(s.session) == HAP_OK);
-    CHECK(ticks_go_on(&s));
-    CHECK(hap_pointer_remove(s.session, hand) == HAP_OK); /* nor has a pointer to wait for it */
-    hand = add_hand(&s, -0.058);
-    CHECK(ticks_go_on(&s));
-    CHECK(hap_session_unlock(s.session) == HAP_OK);
-    hap_stats stats = stats_of(&s);
+    stage *s = stage_running(drives[d]);
+    hap_pointer_id hand = add_hand(s, -0.058);
+    CHECK(ticks_go_on(s));
+    CHECK(hap_session_lock(s->session) == HAP_OK);
+    CHECK(ticks_go_on(s));
+    CHECK(hap_pointer_remove(s->session, hand) == HAP_OK); /* nor has a pointer to wait for it */
+    hand = add_hand(s, -0.058);
+    CHECK(ticks_go_on(s));
+    CHECK(hap_session_unlock(s->session) == HAP_OK);
+    hap_stats stats = stats_of(s);
     CHECK(stats.edits.locks == 1 && stats.edits.held_ms_max > 0.0 && stats.faults.stale_times > 0);
     CHECK(stats.edits.wait_ms_max >= 0.0 && stats.edits.wait_ms_max < stats.edits.held_ms_max);
-    stage_end(&s);
   }
 }
 

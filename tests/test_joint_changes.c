@@ -337,15 +337,13 @@ static void check_left_to_ode(mechanism *m)
 
 TEST(chain_longer_than_the_range_is_odes)
 {
-  mechanism m;
-  open_mechanism(&m, build_long_chain, 9.81);
-  m.w.def.max_bodies = 9;
-  check_left_to_ode(&m);
-  mechanism_begin(&m, build_long_chain, 9.81);
-  m.w.def.max_bodies = 10;
-  cw_run(&m.w, 200);
-  check_owned(&m, 10);
-  cw_close(&m.w);
+  mechanism *m = mechanism_new(build_long_chain, 9.81);
+  m->w.def.max_bodies = 9;
+  check_left_to_ode(m);
+  m = mechanism_running(build_long_chain, 9.81);
+  m->w.def.max_bodies = 10;
+  cw_run(&m->w, 200);
+  check_owned(m, 10);
 }
 
 static void build_many_joints(mechanism *m)

@@ -257,25 +257,23 @@ static int ticks_until_held(size_t k)
 
 static void check_kind(size_t k)
 {
-  mechanism m;
   joint_gauge gauge;
   both worst = {{0.0, 0.0}, {0.0, 0.0}};
   joined_by = kinds[k].join;
-  open_mechanism(&m, build_pair, 1.0);
-  REQUIRE(joint_gauge_init(&gauge, m.w.bodies, 2, NULL) == HAP_OK);
+  mechanism *m = mechanism_new(build_pair, 1.0);
+  REQUIRE(joint_gauge_init(&gauge, m->w.bodies, 2, NULL) == HAP_OK);
   CHECK(gauge.count == 2);
-  start_mechanism(&m);
-  cw_run(&m.w, ticks_until_held(k));
+  start_mechanism(m);
+  cw_run(&m->w, ticks_until_held(k));
   for (int t = ticks_until_held(k); t < (int)lround(SECONDS / PERIOD); ++t) {
-    cw_tick(&m.w);
-    read_both(&m, &gauge, &worst);
+    cw_tick(&m->w);
+    read_both(m, &gauge, &worst);
   }
   printf("# %s: open by %.3g mm in the loop, %.3g mm in the world, turned by %.3g mrad\n",
          kinds[k].name, 1e3 * worst.loop.way, 1e3 * worst.world.way, 1e3 * worst.loop.turn);
   CHECK(worst.loop.way <= CLOSED && worst.world.way <= CLOSED);
   CHECK(worst.loop.turn <= ALIGNED && worst.world.turn <= ALIGNED);
-  CHECK(cw_stats(&m.w).model.range_joints == 2);
-  cw_close(&m.w);
+  CHECK(cw_stats(&m->w).model.range_joints == 2);
 }
 
 TEST(no_kind_opens_in_the_loop)
@@ -300,35 +298,33 @@ static void build_swing(mechanism *m)
  * ODE's step does not hold their joints. */
 TEST(what_ode_has_opened_is_closed_before_a_hand_touches)
 {
-  mechanism m;
   joint_gauge gauge;
   both worst = {{0.0, 0.0}, {0.0, 0.0}};
   double before = 0.0;
   int open_ticks = 0;
   bool closed = false;
-  open_mechanism(&m, build_swing, 9.81);
-  REQUIRE(joint_gauge_init(&gauge, m.w.bodies, 2, NULL) == HAP_OK);
-  cw_start(&m.w, 0.0, -8.0, -0.1);
-  cw_move_hand(&m.w, 0.0, 4.0, 0.0);
-  for (int t = 0; t < 4000 && cw_norm(m.w.force) == 0.0; ++t) {
+  mechanism *m = mechanism_new(build_swing, 9.81);
+  REQUIRE(joint_gauge_init(&gauge, m->w.bodies, 2, NULL) == HAP_OK);
+  cw_start(&m->w, 0.0, -8.0, -0.1);
+  cw_move_hand(&m->w, 0.0, 4.0, 0.0);
+  for (int t = 0; t < 4000 && cw_norm(m->w.force) == 0.0; ++t) {
     worst = (both){{0.0, 0.0}, {0.0, 0.0}};
-    if (m.w.hand_at[1] >= 0.0) {
-      cw_move_hand(&m.w, 0.0, 0.0, 0.0);
+    if (m->w.hand_at[1] >= 0.0) {
+      cw_move_hand(&m->w, 0.0, 0.0, 0.0);
     }
-    cw_tick(&m.w);
-    read_both(&m, &gauge, &worst);
-    bool held = cw_stats(&m.w).model.range_bodies > 0;
+    cw_tick(&m->w);
+    read_both(m, &gauge, &worst);
+    bool held = cw_stats(&m->w).model.range_bodies > 0;
     before = held ? before : fmax(before, worst.world.way);
     closed = closed || (held && worst.loop.way <= CLOSED);
     open_ticks += held && !closed;
   }
   printf("# ODE left it open by %.3g mm, the loop for %d ticks, %.3g mm at the touch\n",
          1e3 * before, open_ticks, 1e3 * worst.loop.way);
-  CHECK(cw_norm(m.w.force) > 0.0);
+  CHECK(cw_norm(m->w.force) > 0.0);
   CHECK(before > CLOSED);
   CHECK(open_ticks <= STEP_TICKS);
   CHECK(worst.loop.way <= CLOSED);
-  cw_close(&m.w);
 }
 
 /* ---- scenes ---- */

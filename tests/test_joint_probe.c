@@ -12,11 +12,6 @@
 
 #define SETTLED_STEPS 3 /* until the loop has what it needs of a joint that it has not met before */
 
-typedef struct difference {
-  double way;  /* m, of the centres */
-  double turn; /* rad, at the end */
-} difference;
-
 /* The same state for both, once the loop owns the mechanism: what is held against ODE is the
  * joint. */
 static void copy_state(const mechanism *from, mechanism *to)
@@ -34,49 +29,21 @@ static void copy_state(const mechanism *from, mechanism *to)
   }
 }
 
-static difference mechanisms_compare(mechanism *loop, mechanism *ode, double seconds)
-{
-  difference out = {0.0, 0.0};
-  int ticks = STEP_TICKS * (int)lround(seconds / (STEP_TICKS * PERIOD));
-  for (int t = 0; t < ticks; ++t) {
-    dWorldStep(ode->w.world, PERIOD);
-    cw_tick(&loop->w);
-    for (int i = 0; i < loop->w.body_count; ++i) {
-      const dReal *p = dBodyGetPosition(ode->w.bodies[i]);
-      const double *q = loop->w.position[i];
-      out.way = fmax(out.way, cw_norm((const double[3]){p[0] - q[0], p[1] - q[1], p[2] - q[2]}));
-    }
-  }
-  cw_tick(&loop->w); /* with its sync */
-  for (int i = 0; i < loop->w.body_count; ++i) {
-    out.turn = fmax(out.turn, turn_between(loop->w.bodies[i], ode->w.bodies[i]));
-  }
-  return out;
-}
-
 static void check_against_ode(build_fn build, double gravity, double way, double turn)
 {
-  mechanism loop;
-  mechanism ode;
-  open_mechanism(&ode, build, gravity);
-  mechanism_begin(&loop, build, gravity);
-  uint32_t moving = 0;
-  for (int i = 0; i < loop.w.body_count; ++i) {
-    moving += dBodyIsKinematic(loop.w.bodies[i]) == 0;
-  }
-  cw_run(&loop.w, SETTLED_STEPS * STEP_TICKS + 1);
-  copy_state(&loop, &ode);
-  difference d = mechanisms_compare(&loop, &ode, 1.0);
-  hap_stats stats = cw_stats(&loop.w);
+  mechanism *ode = mechanism_new(build, gravity);
+  mechanism *loop = mechanism_running(build, gravity);
+  cw_run(&loop->w, SETTLED_STEPS * STEP_TICKS + 1);
+  copy_state(loop, ode);
+  mechanism_difference d = mechanisms_compare(loop, ode, 1.0);
+  hap_stats stats = cw_stats(&loop->w);
   printf("# off by %.3g mm, %.3g mrad; equations by %.3g, %llu probes\n", 1e3 * d.way, 1e3 * d.turn,
          stats.model.joint_error, (unsigned long long)stats.probes.steps);
   CHECK(d.way <= way);
   CHECK(d.turn <= turn);
-  CHECK(stats.model.range_bodies == moving && stats.model.measured_bodies == 0);
-  CHECK(stats.model.range_joints == (uint32_t)loop.joint_count);
+  CHECK(stats.model.range_bodies == moving_bodies(loop) && stats.model.measured_bodies == 0);
+  CHECK(stats.model.range_joints == (uint32_t)loop->joint_count);
   CHECK(stats.faults.fault == 0 && stats.probes.singular == 0);
-  cw_close(&loop.w);
-  cw_close(&ode.w);
 }
 
 static const double rod[3] = {0.04, 0.03, 0.2};
@@ -275,24 +242,20 @@ static void build_lift(mechanism *m)
 
 TEST(lift_goes_up_to_its_stop)
 {
-  mechanism m;
-  mechanism ode;
-  open_mechanism(&ode, build_lift, 9.81);
+  mechanism *ode = mechanism_new(build_lift, 9.81);
   for (int i = 0; i < 300; ++i) {
-    dWorldStep(ode.w.world, PERIOD);
+    dWorldStep(ode->w.world, PERIOD);
   }
-  double stop = dBodyGetPosition(ode.w.bodies[0])[2];
+  double stop = dBodyGetPosition(ode->w.bodies[0])[2];
   CHECK_NEAR(fabs(stop), 0.006, 1e-4);
-  mechanism_begin(&m, build_lift, 9.81);
-  cw_run(&m.w, 60);
-  double z = m.w.position[0][2];
-  cw_run(&m.w, 20);
-  CHECK_NEAR(m.w.position[0][2] - z, (stop > 0.0 ? 1.0 : -1.0) * 0.02 * 0.05, 1e-6);
-  cw_run(&m.w, 240);
-  CHECK_NEAR(m.w.position[0][2], stop, 1e-5);
-  CHECK(cw_stats(&m.w).model.range_joints == 1 && cw_stats(&m.w).model.measured_joints == 1);
-  cw_close(&m.w);
-  cw_close(&ode.w);
+  mechanism *m = mechanism_running(build_lift, 9.81);
+  cw_run(&m->w, 60);
+  double z = m->w.position[0][2];
+  cw_run(&m->w, 20);
+  CHECK_NEAR(m->w.position[0][2] - z, (stop > 0.0 ? 1.0 : -1.0) * 0.02 * 0.05, 1e-6);
+  cw_run(&m->w, 240);
+  CHECK_NEAR(m->w.position[0][2], stop, 1e-5);
+  CHECK(cw_stats(&m->w).model.range_joints == 1 && cw_stats(&m->w).model.measured_joints == 1);
 }
 
 /* Weaker than the weight: it sinks, with what is left of gravity. */
@@ -372,18 +335,15 @@ static uint64_t probes_of_a_sync(mechanism *m)
 /* 6m + 1 with two bodies at most. */
 TEST(probes_are_few_and_reused)
 {
-  mechanism m;
-  mechanism_begin(&m, build_piston, 0.0);
-  cw_run(&m.w, SETTLED_STEPS * STEP_TICKS + 1);
-  uint64_t moving = probes_of_a_sync(&m);
+  mechanism *m = mechanism_running(build_piston, 0.0);
+  cw_run(&m->w, SETTLED_STEPS * STEP_TICKS + 1);
+  uint64_t moving = probes_of_a_sync(m);
   CHECK(moving >= 8 && moving <= 13);
-  cw_close(&m.w);
-  mechanism_begin(&m, build_sprung, 9.81);
-  cw_run(&m.w, SETTLED_STEPS * STEP_TICKS + 1);
-  CHECK(probes_of_a_sync(&m) <= 13);
-  cw_run(&m.w, 8000);
-  CHECK(probes_of_a_sync(&m) == 3); /* nothing moves: it is looked at only */
-  cw_close(&m.w);
+  m = mechanism_running(build_sprung, 9.81);
+  cw_run(&m->w, SETTLED_STEPS * STEP_TICKS + 1);
+  CHECK(probes_of_a_sync(m) <= 13);
+  cw_run(&m->w, 8000);
+  CHECK(probes_of_a_sync(m) == 3); /* nothing moves: it is looked at only */
 }
 
 TEST(sleeping_joint_is_not_probed)

@@ -10,61 +10,18 @@
 
 #include "tests/joint_world.h"
 
-typedef struct difference {
-  double way;  /* m, of the centres */
-  double turn; /* rad, at the syncs */
-  double open; /* m, in the loop's world */
-} difference;
-
-static void compare_step(mechanism *loop, mechanism *ode, difference *out)
-{
-  for (int t = 0; t < STEP_TICKS; ++t) {
-    dWorldStep(ode->w.world, PERIOD);
-    cw_tick(&loop->w);
-    for (int i = 0; i < loop->w.body_count; ++i) {
-      const dReal *p = dBodyGetPosition(ode->w.bodies[i]);
-      const double *q = loop->w.position[i];
-      out->way = fmax(out->way, cw_norm((const double[3]){p[0] - q[0], p[1] - q[1], p[2] - q[2]}));
-    }
-  }
-}
-
-/* The last tick of a step is in ODE with the next one. */
-static difference compare_for(mechanism *loop, mechanism *ode, double seconds)
-{
-  difference out = {0.0, 0.0, 0.0};
-  int steps = (int)lround(seconds / (STEP_TICKS * PERIOD));
-  for (int s = 0; s < steps; ++s) {
-    compare_step(loop, ode, &out);
-    out.open = fmax(out.open, mechanism_openness(loop));
-  }
-  cw_tick(&loop->w); /* with its sync */
-  for (int i = 0; i < loop->w.body_count; ++i) {
-    out.turn = fmax(out.turn, turn_between(loop->w.bodies[i], ode->w.bodies[i]));
-  }
-  return out;
-}
-
 /* Against ODE's exact solver at the rate of the loop. */
 static void check_against_ode(build_fn build, double gravity, double way, double turn)
 {
-  mechanism loop;
-  mechanism ode;
-  open_mechanism(&ode, build, gravity);
-  mechanism_begin(&loop, build, gravity);
-  uint32_t moving = 0;
-  for (int i = 0; i < loop.w.body_count; ++i) {
-    moving += dBodyIsKinematic(loop.w.bodies[i]) == 0;
-  }
-  difference d = compare_for(&loop, &ode, 1.0);
+  mechanism *ode = mechanism_new(build, gravity);
+  mechanism *loop = mechanism_running(build, gravity);
+  mechanism_difference d = mechanisms_compare(loop, ode, 1.0);
   printf("# off by %.3g mm, %.3g mrad; open by %.3g mm\n", 1e3 * d.way, 1e3 * d.turn, 1e3 * d.open);
   CHECK(d.way <= way);
   CHECK(d.turn <= turn);
   CHECK(d.open <= CLOSED);
-  check_owned(&loop, moving);
-  CHECK(cw_norm(loop.w.impulse) == 0.0); /* the hand touched nothing */
-  cw_close(&loop.w);
-  cw_close(&ode.w);
+  check_owned(loop, moving_bodies(loop));
+  CHECK(cw_norm(loop->w.impulse) == 0.0); /* the hand touched nothing */
 }
 
 /* ---- each kind by itself ---- */
@@ -187,16 +144,12 @@ static void build_hinge2_soft(mechanism *m)
 
 TEST(hinge2_is_odes)
 {
-  mechanism loop;
-  mechanism ode;
-  open_mechanism(&ode, build_hinge2_soft, 0.0);
-  mechanism_begin(&loop, build_hinge2, 0.0);
-  difference d = compare_for(&loop, &ode, 1.0);
+  mechanism *ode = mechanism_new(build_hinge2_soft, 0.0);
+  mechanism *loop = mechanism_running(build_hinge2, 0.0);
+  mechanism_difference d = mechanisms_compare(loop, ode, 1.0);
   printf("# off by %.3g mm, %.3g mrad\n", 1e3 * d.way, 1e3 * d.turn);
   CHECK(d.way <= 1e-3 && d.turn <= 2e-2);
-  check_owned(&loop, 2);
-  cw_close(&loop.w);
-  cw_close(&ode.w);
+  check_owned(loop, 2);
 }
 
 static void build_fixed(mechanism *m)
@@ -367,16 +320,15 @@ static void build_pendulum(mechanism *m)
 
 TEST(pendulum_has_its_period)
 {
-  mechanism m;
   double crossings[2] = {0.0, 0.0};
   int count = 0;
-  mechanism_begin(&m, build_pendulum, 9.81);
+  mechanism *m = mechanism_running(build_pendulum, 9.81);
   double inertia = 0.5 * (0.02 * 0.02 + 0.3 * 0.3) / 12.0 + 0.5 * 0.15 * 0.15;
   double period = 2.0 * M_PI * sqrt(inertia / (0.5 * 9.81 * 0.15)) * (1.0 + 0.01 / 16.0);
   for (int i = 0; i < 5000; ++i) {
-    double was = m.w.position[0][0];
-    cw_tick(&m.w);
-    double is = m.w.position[0][0];
+    double was = m->w.position[0][0];
+    cw_tick(&m->w);
+    double is = m->w.position[0][0];
     if (was < 0.0 && is >= 0.0) {
       crossings[count > 0] = PERIOD * (i - is / (is - was));
       ++count;
@@ -388,12 +340,11 @@ TEST(pendulum_has_its_period)
   CHECK_NEAR(measured, period, 1e-4 * period);
   double farthest = 0.0;
   for (int i = 0; i < 1000; ++i) {
-    cw_tick(&m.w);
-    farthest = fmax(farthest, fabs(m.w.position[0][0]));
+    cw_tick(&m->w);
+    farthest = fmax(farthest, fabs(m->w.position[0][0]));
   }
   printf("# %.6f m aside after six swings, %.6f m at the start\n", farthest, 0.15 * sin(0.1));
   CHECK_NEAR(farthest, 0.15 * sin(0.1), 1e-4 * 0.015);
-  cw_close(&m.w);
 }
 
 static void build_motor(mechanism *m)
@@ -431,19 +382,18 @@ static void build_bouncing(mechanism *m)
 
 TEST(stops_throw_back_their_share)
 {
-  mechanism m;
   double highest = -1.0;
   double lowest = 1.0;
   double speeds[3] = {0.0, 0.0, 0.0}; /* before, after the high stop, after the low one */
-  mechanism_begin(&m, build_bouncing, 0.0);
+  mechanism *m = mechanism_running(build_bouncing, 0.0);
   for (int i = 0; i < 1500; ++i) {
-    cw_tick(&m.w);
-    double angle = atan2(m.w.position[0][1], m.w.position[0][0]);
+    cw_tick(&m->w);
+    double angle = atan2(m->w.position[0][1], m->w.position[0][0]);
     highest = fmax(highest, angle);
     lowest = fmin(lowest, angle);
-    speeds[0] = i == 100 ? m.w.velocity[0][1] : speeds[0];
-    speeds[1] = i == 300 ? m.w.velocity[0][1] : speeds[1];
-    speeds[2] = i == 1100 ? m.w.velocity[0][1] : speeds[2];
+    speeds[0] = i == 100 ? m->w.velocity[0][1] : speeds[0];
+    speeds[1] = i == 300 ? m->w.velocity[0][1] : speeds[1];
+    speeds[2] = i == 1100 ? m->w.velocity[0][1] : speeds[2];
   }
   printf("# speeds %.4f %.4f %.4f m/s, between %.5f and %.5f rad\n", speeds[0], speeds[1],
          speeds[2], lowest, highest);
@@ -452,7 +402,6 @@ TEST(stops_throw_back_their_share)
   CHECK_NEAR(speeds[2], 0.025, 1e-3);
   CHECK(highest <= 0.15 + 1e-4 && highest >= 0.149);
   CHECK(lowest >= -0.2 - 1e-4 && lowest <= -0.199);
-  cw_close(&m.w);
 }
 
 /* 45 degrees; falls onto its stop and rests there. */

@@ -183,25 +183,23 @@ TEST(lockstep_steps_are_due_at_whole_ticks)
 
 TEST(frame_drive_keeps_the_remainder_and_does_at_most_three_steps)
 {
-  stage s;
-  stage_run(&s, HAP_DRIVE_FRAME); /* H = 20 ms */
-  CHECK(hap_session_update(s.session, 0.012) == HAP_OK);
-  CHECK(atomic_load(&s.steps) == 0);
-  CHECK(hap_session_update(s.session, 0.012) == HAP_OK);
-  CHECK(atomic_load(&s.steps) == 1); /* 4 ms are left */
-  CHECK(hap_session_update(s.session, 0.0) == HAP_OK);
-  CHECK(hap_session_update(s.session, 0.056) == HAP_OK);
-  CHECK(atomic_load(&s.steps) == 4 && stats_of(&s).physics.frames_dropped == 0);
-  CHECK(hap_session_update(s.session, 0.215) == HAP_DROPPED);
-  CHECK(atomic_load(&s.steps) == 7 && stats_of(&s).physics.frames_dropped == 7);
-  CHECK(hap_session_update(s.session, 0.005) == HAP_OK); /* 15 ms were left */
-  CHECK(atomic_load(&s.steps) == 8);
+  stage *s = stage_running(HAP_DRIVE_FRAME); /* H = 20 ms */
+  CHECK(hap_session_update(s->session, 0.012) == HAP_OK);
+  CHECK(atomic_load(&s->steps) == 0);
+  CHECK(hap_session_update(s->session, 0.012) == HAP_OK);
+  CHECK(atomic_load(&s->steps) == 1); /* 4 ms are left */
+  CHECK(hap_session_update(s->session, 0.0) == HAP_OK);
+  CHECK(hap_session_update(s->session, 0.056) == HAP_OK);
+  CHECK(atomic_load(&s->steps) == 4 && stats_of(s).physics.frames_dropped == 0);
+  CHECK(hap_session_update(s->session, 0.215) == HAP_DROPPED);
+  CHECK(atomic_load(&s->steps) == 7 && stats_of(s).physics.frames_dropped == 7);
+  CHECK(hap_session_update(s->session, 0.005) == HAP_OK); /* 15 ms were left */
+  CHECK(atomic_load(&s->steps) == 8);
   for (int i = 0; i < 100; ++i) { /* fractions do not get lost */
-    CHECK(hap_session_update(s.session, 0.02 / 3.0) == HAP_OK);
+    CHECK(hap_session_update(s->session, 0.02 / 3.0) == HAP_OK);
   }
-  CHECK(atomic_load(&s.steps) == 8 + 33);
-  CHECK(stats_of(&s).physics.frames_dropped == 7);
-  stage_end(&s);
+  CHECK(atomic_load(&s->steps) == 8 + 33);
+  CHECK(stats_of(s).physics.frames_dropped == 7);
 }
 
 TEST(models_change_while_running)
@@ -427,15 +425,13 @@ TEST(edits_left_over_run_at_stop_in_every_drive)
   static const hap_drive drives[] = {HAP_DRIVE_THREADS, HAP_DRIVE_FRAME, HAP_DRIVE_LOCKSTEP};
   for (int d = 0; d < 3; ++d) {
     static edit edits[100];
-    stage s;
-    stage_run(&s, drives[d]);
+    stage *s = stage_running(drives[d]);
     for (int i = 0; i < 100; ++i) {
-      edits[i] = (edit){&s, i};
-      CHECK(hap_session_post(s.session, run_edit, &edits[i]) == HAP_OK);
+      edits[i] = (edit){s, i};
+      CHECK(hap_session_post(s->session, run_edit, &edits[i]) == HAP_OK);
     }
-    CHECK(hap_session_stop(s.session) == HAP_OK);
-    CHECK(s.seen[0] == 100 && s.seen[1] == 0);
-    stage_end(&s);
+    CHECK(hap_session_stop(s->session) == HAP_OK);
+    CHECK(s->seen[0] == 100 && s->seen[1] == 0);
   }
 }
 

@@ -355,52 +355,50 @@ static const struct {
 TEST(bad_pointer_defs_are_named)
 {
   static const unsigned char garbage[] = {0x00, 0xff, 0xa5};
-  stage s;
   hap_pointer_id id = {7};
-  stage_run(&s, HAP_DRIVE_LOCKSTEP);
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
   for (size_t i = 0; i < sizeof bad_fields / sizeof bad_fields[0]; ++i) {
     pointer_defs defs;
     pointer_defs_init(&defs.def, &defs.expert, &defs.research);
     memcpy((char *)&defs + bad_fields[i].offset, &bad_fields[i].value, sizeof(double));
-    CHECK(hap_pointer_add(s.session, &defs.def, &id) == bad_fields[i].status);
+    CHECK(hap_pointer_add(s->session, &defs.def, &id) == bad_fields[i].status);
     const char *dot = strchr(bad_fields[i].name, '.');
     char name[64];
     snprintf(name, sizeof name, "%.*s",
              dot != NULL ? (int)(dot - bad_fields[i].name) : (int)strlen(bad_fields[i].name),
              bad_fields[i].name);
-    CHECK(text_has(detail_of(&s), name));
+    CHECK(text_has(detail_of(s), name));
     CHECK(id.v == 0);
   }
   for (int i = 0; i < 3; ++i) {
     hap_pointer_def def;
     memset(&def, garbage[i], sizeof def);
-    CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_UNINITIALISED);
-    CHECK(text_has(detail_of(&s), "hap_pointer_def_init"));
+    CHECK(hap_pointer_add(s->session, &def, &id) == HAP_ERROR_UNINITIALISED);
+    CHECK(text_has(detail_of(s), "hap_pointer_def_init"));
     pointer_defs defs;
     pointer_defs_init(&defs.def, &defs.expert, &defs.research);
     memset(&defs.expert, garbage[i], sizeof defs.expert);
-    CHECK(hap_pointer_add(s.session, &defs.def, &id) == HAP_ERROR_UNINITIALISED);
-    CHECK(text_has(detail_of(&s), "hap_pointer_expert_def_init"));
+    CHECK(hap_pointer_add(s->session, &defs.def, &id) == HAP_ERROR_UNINITIALISED);
+    CHECK(text_has(detail_of(s), "hap_pointer_expert_def_init"));
     defs.def.expert = NULL;
     memset(&defs.research, garbage[i], sizeof defs.research);
-    CHECK(hap_pointer_add(s.session, &defs.def, &id) == HAP_ERROR_UNINITIALISED);
-    CHECK(text_has(detail_of(&s), "hap_pointer_research_def_init"));
+    CHECK(hap_pointer_add(s->session, &defs.def, &id) == HAP_ERROR_UNINITIALISED);
+    CHECK(text_has(detail_of(s), "hap_pointer_research_def_init"));
   }
   hap_pointer_def def = pointer_def(NULL);
   def.hull_points = 4;
-  CHECK(hap_pointer_add(s.session, &def, &id) == HAP_ERROR_ARGUMENT);
-  CHECK(text_has(detail_of(&s), "hull_xyz is NULL"));
+  CHECK(hap_pointer_add(s->session, &def, &id) == HAP_ERROR_ARGUMENT);
+  CHECK(text_has(detail_of(s), "hull_xyz is NULL"));
   def = pointer_def(NULL);
   hap_pointer_expert_def expert;
   hap_pointer_expert_def_init(&expert, sizeof expert);
   def.expert = &expert;
   expert.coupling = HAP_COUPLING_PROXY; /* without a device that says what it can hold */
-  CHECK(hap_pointer_add(s.session, &def, &id) < HAP_OK && id.v == 0);
-  CHECK(hap_pointer_add(s.session, NULL, &id) == HAP_ERROR_ARGUMENT);
-  CHECK(hap_pointer_add(s.session, &def, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_add(s->session, &def, &id) < HAP_OK && id.v == 0);
+  CHECK(hap_pointer_add(s->session, NULL, &id) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_add(s->session, &def, NULL) == HAP_ERROR_ARGUMENT);
   hap_pointer_def_init(&def, offsetof(hap_pointer_def, friction)); /* of an older build */
-  CHECK(hap_pointer_add(s.session, &def, &id) == HAP_OK && id.v != 0);
-  stage_end(&s);
+  CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK && id.v != 0);
 }
 
 /* ---- targets ---- */
@@ -550,32 +548,30 @@ static void destroy_cube(stage *s)
 TEST(a_body_may_go_while_it_is_pushed)
 {
   for (int told = 0; told < 2; ++told) {
-    stage s;
     hap_pointer_id id;
-    stage_run(&s, HAP_DRIVE_LOCKSTEP);
+    stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
     hap_pointer_def def = pointer_def(NULL);
-    CHECK(hap_session_trace_bodies(s.session, &s.cube, 1) == HAP_OK);
-    CHECK(hap_pointer_add(s.session, &def, &id) == HAP_OK && move_to(&s, id, -0.058) == HAP_OK);
-    CHECK(hap_session_advance(s.session, 70) == HAP_OK);
-    CHECK(stats_of(&s).model.neighbours == 1);
-    dBodyID was = s.cube;
+    CHECK(hap_session_trace_bodies(s->session, &s->cube, 1) == HAP_OK);
+    CHECK(hap_pointer_add(s->session, &def, &id) == HAP_OK && move_to(s, id, -0.058) == HAP_OK);
+    CHECK(hap_session_advance(s->session, 70) == HAP_OK);
+    CHECK(stats_of(s).model.neighbours == 1);
+    dBodyID was = s->cube;
     if (told != 0) {
-      CHECK(hap_session_forget_geom(s.session, s.geom) == HAP_OK);
-      CHECK(hap_session_forget_body(s.session, s.cube) == HAP_OK);
+      CHECK(hap_session_forget_geom(s->session, s->geom) == HAP_OK);
+      CHECK(hap_session_forget_body(s->session, s->cube) == HAP_OK);
     }
-    destroy_cube(&s);
-    hap_status status = hap_session_advance(s.session, 30);
+    destroy_cube(s);
+    hap_status status = hap_session_advance(s->session, 30);
     CHECK(status == (told != 0 ? HAP_OK : HAP_BODY_LOST));
-    CHECK(told != 0 || text_has(detail_of(&s), "hap_session_forget_body"));
-    CHECK(stats_of(&s).faults.bodies_lost == (told != 0 ? 0u : 1u));
-    CHECK(stats_of(&s).model.neighbours == 0 && stats_of(&s).model.bodies_known == 0);
+    CHECK(told != 0 || text_has(detail_of(s), "hap_session_forget_body"));
+    CHECK(stats_of(s).faults.bodies_lost == (told != 0 ? 0u : 1u));
+    CHECK(stats_of(s).model.neighbours == 0 && stats_of(s).model.bodies_known == 0);
     hap_pose pose;
-    CHECK(hap_session_poses(s.session, 0, &was, 1, &pose) == HAP_ERROR_NOT_FOUND);
-    s.cube = add_cube(&s, 0.0, &s.geom); /* another one in its place, maybe at its address */
-    CHECK(hap_session_advance(s.session, 100) == HAP_OK);
-    CHECK(stats_of(&s).model.neighbours == 1 && stats_of(&s).faults.count == 0);
-    CHECK(dBodyGetPosition(s.cube)[0] >= 0.0);
-    stage_end(&s);
+    CHECK(hap_session_poses(s->session, 0, &was, 1, &pose) == HAP_ERROR_NOT_FOUND);
+    s->cube = add_cube(s, 0.0, &s->geom); /* another one in its place, maybe at its address */
+    CHECK(hap_session_advance(s->session, 100) == HAP_OK);
+    CHECK(stats_of(s).model.neighbours == 1 && stats_of(s).faults.count == 0);
+    CHECK(dBodyGetPosition(s->cube)[0] >= 0.0);
   }
 }
 

@@ -57,8 +57,8 @@ static figures push_row(int count)
   return out;
 }
 
-/* Not too dear, and in vain: it is tried again, less and less often. A tick has two solves, and what
- * slides is felt. */
+/* Not too dear, and in vain: it is tried again, less and less often. A tick has two solves, and
+ * what slides is felt. */
 TEST(what_is_in_vain_rests)
 {
   figures f = push_row(36);

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "base/assert.h"
+#include "base/effect_table.h"
 #include "base/vec.h"
 
 /* What the effects of the newest model came to, and why: counted from the model itself, as it
@@ -185,20 +185,14 @@ static void note_model_accelerance(const sight *s, hapi_model *model)
   }
 }
 
+/* What the model cannot have. */
 static void note_others(const sight *s)
 {
-  static const hap_effect loops[] = {HAP_EFFECT_CONTACTS,    HAP_EFFECT_PASSES, HAP_EFFECT_JOINTS,
-                                     HAP_EFFECT_RANGE,       HAP_EFFECT_GYRO,   HAP_EFFECT_SHAPE,
-                                     HAP_EFFECT_RESTITUTION, HAP_EFFECT_PROXY};
-  for (size_t i = 0; s->cycle->model != HAP_MODEL_CONTACT && i < sizeof loops / sizeof loops[0];
-       ++i) {
-    effect_set(s, loops[i], HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
-  }
-  if (s->cycle->model != HAP_MODEL_ACCELERANCE) {
-    effect_set(s, HAP_EFFECT_CROSS, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
-  }
-  if (s->cycle->model == HAP_MODEL_SINGLE || s->cycle->model == HAP_MODEL_IMPULSE) {
-    effect_set(s, HAP_EFFECT_TESTING, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
+  for (int i = 0; i < HAP_EFFECTS; ++i) {
+    unsigned has = hapi_effect_rows[i].has;
+    if (has != 0 && (has & HAPI_MODEL_BIT(s->cycle->model)) == 0) {
+      effect_set(s, (hap_effect)i, HAP_EFFECT_IS_OFF, HAP_REASON_NOT_IN_MODEL);
+    }
   }
 }
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/cycles.h"
+#include "base/effect_table.h"
 #include "haptic/haptic_internal.h"
 
 /* The loop's part of what is told of the effects: their time, and the state of those that pointers
@@ -97,18 +98,12 @@ static void fill_state(const hapi_haptic *haptic, int noted, hap_effect_info *ou
   out->state = (uint32_t)(word >> 48);
 }
 
-/* What has no part of its own in a tick, or none that can be told from the rest. */
-static bool has_time(int effect)
-{
-  return effect != HAP_EFFECT_TESTING && effect != HAP_EFFECT_PASSES && effect != HAP_EFFECT_RANGE;
-}
-
 void hapi_haptic_effects(const hapi_haptic *haptic, hap_effect_info *out)
 {
   const hapi_loop_effects *e = &haptic->effects;
   uint64_t samples = atomic_load_explicit(&e->samples, memory_order_relaxed);
   for (int i = 0; i < HAP_EFFECTS; ++i) {
-    if (samples > 0 && has_time(i)) {
+    if (samples > 0 && hapi_effect_rows[i].timed) {
       double ns = atomic_load_explicit(&e->spent_ns[i], memory_order_relaxed);
       out[i].tick_us = 1e-3 * ns / (double)samples;
     }

@@ -5,40 +5,12 @@
 
 #include <hapode/effects.h>
 
+#include "base/effect_table.h"
 #include "base/log.h"
 #include "base/wishes.h"
 #include "session/session_internal.h"
 
-/* The effects of a session: names, what a model can fulfil, wishes and states. */
-
-#define BIT(model) (1u << (unsigned)(model))
-#define ACCELERANCE BIT(HAP_MODEL_ACCELERANCE)
-#define CONTACT BIT(HAP_MODEL_CONTACT)
-#define EVERY (BIT(HAP_MODEL_SINGLE) | BIT(HAP_MODEL_IMPULSE) | ACCELERANCE | CONTACT)
-
-typedef struct effect_row {
-  const char *name;
-  const char *text;
-  unsigned has;   /* models that can have it */
-  unsigned needs; /* of these, the ones that are made of it */
-} effect_row;
-
-static const effect_row effects[HAP_EFFECTS] = {
-    [HAP_EFFECT_TESTING] = {"testing", "testing simulations", ACCELERANCE | CONTACT, ACCELERANCE},
-    [HAP_EFFECT_CROSS] = {"cross", "cross accelerance between local bodies", ACCELERANCE, 0},
-    [HAP_EFFECT_CONTACTS] = {"contacts", "contacts between bodies in the loop", CONTACT, 0},
-    [HAP_EFFECT_PASSES] = {"passes", "contact passes between syncs", CONTACT, 0},
-    [HAP_EFFECT_JOINTS] = {"joints", "joints in the loop", CONTACT, 0},
-    [HAP_EFFECT_RANGE] = {"range", "local range beyond the neighbours", CONTACT, 0},
-    [HAP_EFFECT_RESTITUTION] = {"restitution", "restitution in the loop", CONTACT, 0},
-    [HAP_EFFECT_FRICTION] = {"friction", "friction on the pointer", EVERY, 0},
-    [HAP_EFFECT_TORQUE] = {"torque", "torque on the hand", EVERY, 0},
-    [HAP_EFFECT_GYRO] = {"gyro", "gyroscopic term in the loop", CONTACT, 0},
-    [HAP_EFFECT_SHAPE] = {"shape", "shape at every tick instead of a plane", CONTACT, 0},
-    [HAP_EFFECT_PROXY] = {"proxy", "coupling by a proxy", CONTACT, 0},
-    [HAP_EFFECT_OBSERVER] = {"observer", "energy observer", EVERY, 0},
-    [HAP_EFFECT_RECORDING] = {"recording", "recording for a replay bit for bit", 0, 0},
-};
+/* The effects of a session: what a model can fulfil, wishes and states. */
 
 static const char *const wishes[] = {"auto", "off", "on"};
 
@@ -54,12 +26,12 @@ static bool is_wish(hap_effect_wish wish)
 
 const char *hap_effect_name(hap_effect effect)
 {
-  return is_effect(effect) ? effects[effect].name : NULL;
+  return is_effect(effect) ? hapi_effect_rows[effect].name : NULL;
 }
 
 const char *hap_effect_text(hap_effect effect)
 {
-  return is_effect(effect) ? effects[effect].text : NULL;
+  return is_effect(effect) ? hapi_effect_rows[effect].text : NULL;
 }
 
 const char *hap_effect_wish_name(hap_effect_wish wish)
@@ -108,7 +80,7 @@ const char *hap_effect_reason_text(hap_effect_reason reason)
 static hap_status effect_refuse(hap_effect effect, hap_effect_wish wish, hap_model model,
                                 hap_detail *detail)
 {
-  const effect_row *e = &effects[effect];
+  const hapi_effect_row *e = &hapi_effect_rows[effect];
   if (effect == HAP_EFFECT_RECORDING) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
                      "recording=on: a recording needs a file: call hap_session_record");
@@ -122,7 +94,8 @@ static hap_status effect_refuse(hap_effect effect, hap_effect_wish wish, hap_mod
       detail, HAP_ERROR_UNSUPPORTED,
       "%s=on is not supported in model %s, which has no %s; use model %s", e->name,
       hap_model_name(model), e->text,
-      hap_model_name((e->has & CONTACT) != 0 ? HAP_MODEL_CONTACT : HAP_MODEL_ACCELERANCE));
+      hap_model_name((e->has & HAPI_MODEL_BIT(HAP_MODEL_CONTACT)) != 0 ? HAP_MODEL_CONTACT
+                                                                       : HAP_MODEL_ACCELERANCE));
 }
 
 hap_status hap_effect_check(hap_effect effect, hap_effect_wish wish, hap_model model,
@@ -132,8 +105,9 @@ hap_status hap_effect_check(hap_effect effect, hap_effect_wish wish, hap_model m
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "there is no effect %d, wish %d or model %d",
                      (int)effect, (int)wish, (int)model);
   }
-  bool lacks = wish == HAP_EFFECT_ON && (effects[effect].has & BIT(model)) == 0;
-  bool needs = wish == HAP_EFFECT_OFF && (effects[effect].needs & BIT(model)) != 0;
+  bool lacks = wish == HAP_EFFECT_ON && (hapi_effect_rows[effect].has & HAPI_MODEL_BIT(model)) == 0;
+  bool needs =
+      wish == HAP_EFFECT_OFF && (hapi_effect_rows[effect].needs & HAPI_MODEL_BIT(model)) != 0;
   return lacks || needs ? effect_refuse(effect, wish, model, detail) : HAP_OK;
 }
 
@@ -171,7 +145,7 @@ hap_status hapi_session_check_effects(const hap_session_def *def, hap_detail *de
   for (int i = 0; i < HAP_EFFECTS; ++i) {
     if ((expert->effects_on & expert->effects_off & HAP_EFFECT_BIT(i)) != 0) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is in effects_on and in effects_off",
-                       effects[i].name);
+                       hapi_effect_rows[i].name);
     }
     HAPI_TRY(wish_check(def, (hap_effect)i, wish_of(expert, i), def->model, detail));
   }

@@ -8,8 +8,8 @@
 #include "proximity/constrained_ball.h"
 
 /* Where a hull may be beside a geom is, for its orientation, all space but a convex region: the
- * hull is a point there, and follows the constrained ball's ways. The radius is any; it only keeps what
- * is a little inside from being taken for deep. */
+ * hull is a point there, and follows the constrained ball's ways. The radius is any; it only keeps
+ * what is a little inside from being taken for deep. */
 #define RADIUS 1.0
 
 #define SAME_PLACE 1e-6 /* m: the points are those of the told side */
