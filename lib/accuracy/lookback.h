@@ -69,8 +69,7 @@ typedef struct hapi_lookback_hand {
       hull_of[HAP_TRACE_POINTERS_MAX]; /* generation of the pointer, in this window; 0: not known */
   struct hapi_tick *tick;
   hapi_model *model;
-  hapi_state_pointer *told;       /* what physics knows of the pointers */
-  struct hapi_found_point *found; /* scratch */
+  hapi_state_pointer *told; /* what physics knows of the pointers */
 } hapi_lookback_hand;
 
 /* A time of the window at which a step begins. */

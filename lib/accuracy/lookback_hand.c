@@ -99,7 +99,6 @@ void hapi_lookback_hand_finish(hapi_lookback_hand *hand)
   }
   hapi_free(hand->tick);
   hapi_free(hand->model);
-  hapi_free(hand->found);
   hapi_free(hand->told);
   memset(hand, 0, sizeof *hand);
 }
@@ -113,10 +112,9 @@ bool hapi_lookback_hand_ready(hapi_lookback_hand *hand, const hapi_capacity *all
   if (hand->ready) {
     return true;
   }
-  hand->found = hapi_alloc_array(HAPI_TOOL_SPOTS, sizeof *hand->found);
   hand->told = hapi_alloc_array(capacity.pointers, sizeof *hand->told);
-  hand->ready = hand->found != NULL && hand->told != NULL && hand_create_tick(hand, &capacity) &&
-                hand_create_model(hand, &capacity);
+  hand->ready =
+      hand->told != NULL && hand_create_tick(hand, &capacity) && hand_create_model(hand, &capacity);
   if (!hand->ready) {
     hapi_lookback_hand_finish(hand);
     return false;
@@ -324,12 +322,11 @@ static const hapi_tool_side *tool_side(const hapi_tick *tick, const hapi_lookbac
   return NULL;
 }
 
-/* False: there are more points than the loop has room for. */
-static bool model_add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t body,
-                           const hapi_state_pointer *p, double period)
+/* False: no memory. */
+static bool look_tool(const hapi_lookback *w, const hapi_lookback_touch *t,
+                      const hapi_state_pointer *p, double period, uint32_t found)
 {
-  hapi_lookback_hand *hand = &w->hand;
-  hapi_model *m = hand->model;
+  const hapi_lookback_hand *hand = &w->hand;
   double spin = p->extent * hapi_v3_norm(p->twist.angular);
   double speed = hapi_neighbors_speed(t->geom, p, p->pose.position) + spin +
                  hapi_neighbors_spin(t->geom, p->extent);
@@ -341,13 +338,21 @@ static bool model_add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t bo
                            .reach = hapi_neighbors_reach(speed, period),
                            .horizon = period,
                            .side = tool_side(hand->tick, t)};
-  uint32_t count = hapi_tool_points(w->near, &at, hand->found);
-  if (m->tool_count + count > hand->tick->capacity.tool_points) {
+  return hapi_tool_look(w->near, &at, found);
+}
+
+/* False: there are more points than the loop has room for. */
+static bool model_add_tool(hapi_lookback *w, const hapi_lookback_touch *t, uint32_t body,
+                           const hapi_tool_found *found)
+{
+  hapi_model *m = w->hand.model;
+  const hapi_found_point *points = &w->near->tools.points[found->first];
+  if (m->tool_count + found->count > w->hand.tick->capacity.tool_points) {
     return false;
   }
-  for (uint32_t i = 0; i < count; ++i) {
+  for (uint32_t i = 0; i < found->count; ++i) {
     hapi_tool_point *to = &hapi_model_tools(m)[m->tool_count];
-    *to = hand->found[i].tool;
+    *to = points[i].tool;
     to->mu = t->mu;
     to->at.body_b = body;
     to->at.generation_b = body != HAPI_SLOT_NONE ? 1 : 0;
@@ -356,24 +361,43 @@ static bool model_add_tool(hapi_lookback *w, hapi_lookback_touch *t, uint32_t bo
   return true;
 }
 
+/* The pointer that touches; NULL: it does no more. */
+static const hapi_pointer *touch_pointer(const hapi_lookback *w, const hapi_lookback_touch *t)
+{
+  const hapi_pointer *of = &w->hand.tick->pointers.of[t->pointer];
+  return t->there && of->generation != 0 && t->generation == of->generation ? of : NULL;
+}
+
 /* False: something is touched that the window does not know. */
 static bool model_add_touches(hapi_lookback *w, double period)
 {
-  const hapi_tick *tick = w->hand.tick;
+  uint32_t found = 0;
+  w->near->tools.count = 0; /* of the cycle's points nothing is needed any more */
   for (uint32_t i = 0; i < w->touches.count; ++i) {
     hapi_lookback_touch *t = &w->touches.list[i];
+    const hapi_pointer *of = touch_pointer(w, t);
+    const hapi_state_pointer *p = &w->hand.told[t->pointer];
     uint32_t body;
-    const hapi_pointer *of = &tick->pointers.of[t->pointer];
-    if (!t->there || of->generation == 0 || t->generation != of->generation) {
+    if (of == NULL) {
       continue;
     }
     if (!geom_body(&w->test, t->geom, &body)) {
       return false;
     }
-    const hapi_state_pointer *p = &w->hand.told[t->pointer];
     if (of->shape.hull == NULL) {
       model_add_sphere(w, t, body, p, period);
-    } else if (!model_add_tool(w, t, body, p, period)) {
+    } else if (!look_tool(w, t, p, period, found++)) {
+      return false;
+    }
+  }
+  hapi_tool_join(w->near, found);
+  found = 0;
+  for (uint32_t i = 0; i < w->touches.count; ++i) {
+    const hapi_lookback_touch *t = &w->touches.list[i];
+    const hapi_pointer *of = touch_pointer(w, t);
+    uint32_t body;
+    if (of != NULL && of->shape.hull != NULL && geom_body(&w->test, t->geom, &body) &&
+        !model_add_tool(w, t, body, &w->near->tools.found[found++])) {
       return false;
     }
   }

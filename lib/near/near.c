@@ -52,7 +52,7 @@ void hapi_nearby_finish(hapi_nearby *nearby)
   hapi_free(nearby->tools.points);
   hapi_free(nearby->tools.marks);
   hapi_free(nearby->tools.parts);
-  hapi_free(nearby->tools.hits);
+  hapi_free(nearby->tools.found);
   hapi_geom_names_finish(&nearby->tools.names);
   hapi_free(nearby->slots.bodies);
   hapi_free(nearby->slots.contacts);

@@ -543,7 +543,7 @@ static uint32_t hits_join(hapi_nearby *nearby, uint32_t count)
   if (nearby->cycle->model == HAP_MODEL_CONTACT) {
     return count;
   }
-  hapi_tool_join(nearby, count);
+  hapi_tool_join_hits(nearby, count);
   for (uint32_t i = 0; i < count; ++i) {
     const hapi_state_pointer *p = &hapi_state_pointers(nearby->cycle->state)[hits[i].pointer];
     if (p->is_tool == 0 || hits[i].tool_count > 0) {

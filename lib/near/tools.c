@@ -258,27 +258,16 @@ static void search_find(tool_search *s)
   }
 }
 
-uint32_t hapi_tool_points(hapi_nearby *nearby, const hapi_tool_at *at,
-                          hapi_found_point out[HAPI_TOOL_SPOTS])
-{
-  tool_search s;
-  search_begin(&s, nearby, at, &at->pointer->pose);
-  search_find(&s);
-  search_reduce(&s);
-  memcpy(out, s.found, s.count * sizeof *out);
-  return s.count;
-}
-
-/* Behind all others; false: no memory, or there are none. */
-static bool store_points(hapi_nearby *nearby, const tool_search *s, hapi_hit *io)
+/* Behind all others; false: no memory. */
+static bool store_points(hapi_nearby *nearby, const tool_search *s, hapi_tool_found *out)
 {
   hapi_tool_search *tools = &nearby->tools;
-  if (s->count == 0 || !hapi_reserve((void **)&tools->points, &tools->capacity, tools->count,
-                                     s->count, sizeof s->found[0])) {
+  if (!hapi_reserve((void **)&tools->points, &tools->capacity, tools->count, s->count,
+                    sizeof s->found[0])) {
     return false;
   }
-  io->tool_first = tools->count;
-  io->tool_count = s->count;
+  out->first = tools->count;
+  out->count = s->count;
   memcpy(&tools->points[tools->count], s->found, s->count * sizeof s->found[0]);
   tools->count += s->count;
   return true;
@@ -355,55 +344,41 @@ bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_h
     pose = pointer->pose; /* the far face must not be taken for the near one */
   }
   search_reduce(&s);
-  if (!store_points(nearby, &s, out)) {
+  hapi_tool_found found;
+  if (s.count == 0 || !store_points(nearby, &s, &found)) {
     return false;
   }
+  out->tool_first = found.first;
+  out->tool_count = found.count;
   fill_hit(&s, out);
   return true;
 }
 
 /* ---- where geoms adjoin, as tool_seams.h asks ---- */
 
-/* The parts are the hits of hulls. */
+/* The parts are those found. */
 typedef struct tool_join {
   hapi_nearby *nearby;
   hapi_tool_seams *seams;
   tool_search search; /* scratch */
 } tool_join;
 
-static hapi_hit *join_hit(const tool_join *join, uint32_t part)
-{
-  return &join->nearby->neighbors.hits[join->nearby->tools.hits[part]];
-}
-
-static hapi_tool_at join_at(const tool_join *join, uint32_t part)
-{
-  hapi_nearby *nearby = join->nearby;
-  const hapi_hit *hit = join_hit(join, part);
-  return (hapi_tool_at){.geom = hit->geom,
-                        .index = hit->pointer,
-                        .pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer],
-                        .hull = &hapi_state_hulls(nearby->cycle->state)[hit->pointer],
-                        .key = join->seams->parts[part].key,
-                        .reach = HUGE_VAL,
-                        .horizon = nearby->cycle->probe_step_s};
-}
-
 static bool join_holds(void *of, uint32_t part, const double point[3], double within)
 {
   tool_join *join = of;
   hapi_nearest nearest;
-  return hapi_geom_nearest(join->nearby, join_hit(join, part)->geom, point, 0.0, within, &nearest);
+  dGeomID geom = join->nearby->tools.found[part].at.geom;
+  return hapi_geom_nearest(join->nearby, geom, point, 0.0, within, &nearest);
 }
 
 static double join_depth(void *of, uint32_t part, const double away[3])
 {
   tool_join *join = of;
+  const hapi_tool_found *found = &join->nearby->tools.found[part];
   double distance;
   double normal[3];
-  const hapi_tool_at at = join_at(join, part);
-  search_begin(&join->search, join->nearby, &at, &join_hit(join, part)->tool_pose);
-  hap_pose pose = join->search.pose;
+  search_begin(&join->search, join->nearby, &found->at, &found->pose);
+  hap_pose pose = found->pose;
   hapi_v3_add(pose.position, away, pose.position);
   return search_distance(&join->search, &pose, &distance, normal) ? -distance : -HUGE_VAL;
 }
@@ -412,18 +387,18 @@ static double join_depth(void *of, uint32_t part, const double away[3])
 static bool join_mark(const tool_join *join, uint32_t part)
 {
   hapi_tool_search *tools = &join->nearby->tools;
-  const hapi_hit *hit = join_hit(join, part);
+  const hapi_tool_found *found = &tools->found[part];
   hapi_tool_part *to = &join->seams->parts[part];
-  uint32_t end = hit->tool_first + hit->tool_count;
+  uint32_t end = found->first + found->count;
   uint32_t known = end < tools->mark_capacity ? end : tools->mark_capacity;
   if (!hapi_reserve((void **)&tools->marks, &tools->mark_capacity, known, end - known,
                     sizeof *tools->marks)) {
     return false;
   }
   join->seams->marks = tools->marks;
-  to->first = hit->tool_first;
-  to->count = hit->tool_count;
-  for (uint32_t i = hit->tool_first; i < end; ++i) {
+  to->first = found->first;
+  to->count = found->count;
+  for (uint32_t i = found->first; i < end; ++i) {
     const hapi_found_point *from = &tools->points[i];
     hapi_tool_mark *mark = &tools->marks[i];
     *mark = (hapi_tool_mark){.gap = from->gap, .border = from->tool.at.slide != HAPI_SLIDE_NONE};
@@ -437,15 +412,12 @@ static bool join_mark(const tool_join *join, uint32_t part)
 static void join_look(void *of, uint32_t part, const double away[3])
 {
   tool_join *join = of;
-  hapi_hit *hit = join_hit(join, part);
-  hapi_tool_part *to = &join->seams->parts[part];
-  const hapi_tool_at at = join_at(join, part);
-  search_begin(&join->search, join->nearby, &at, &hit->tool_pose);
+  hapi_tool_found *found = &join->nearby->tools.found[part];
+  search_begin(&join->search, join->nearby, &found->at, &found->pose);
   search_look(&join->search, away);
   search_reduce(&join->search);
-  to->count = hit->tool_count = 0;
-  if (store_points(join->nearby, &join->search, hit)) {
-    fill_hit(&join->search, hit);
+  join->seams->parts[part].count = found->count = 0;
+  if (store_points(join->nearby, &join->search, found)) {
     (void)join_mark(join, part);
   }
 }
@@ -453,13 +425,13 @@ static void join_look(void *of, uint32_t part, const double away[3])
 /* What is left of the part's points. */
 static void join_keep(const tool_join *join, uint32_t part)
 {
-  hapi_hit *hit = join_hit(join, part);
+  hapi_tool_found *found = &join->nearby->tools.found[part];
   const hapi_tool_part *from = &join->seams->parts[part];
   hapi_found_point *points = join->nearby->tools.points;
-  hit->tool_count = 0;
+  found->count = 0;
   for (uint32_t i = from->first; i < from->first + from->count; ++i) {
     if (!join->seams->marks[i].dropped) {
-      hapi_found_point *to = &points[hit->tool_first + hit->tool_count++];
+      hapi_found_point *to = &points[found->first + found->count++];
       *to = points[i];
       to->tool.group = from->group;
     }
@@ -470,32 +442,80 @@ void hapi_tool_join(hapi_nearby *nearby, uint32_t count)
 {
   hapi_tool_search *tools = &nearby->tools;
   tool_join join = {.nearby = nearby};
-  hapi_tool_seams seams = {
-      .of = &join, .holds = join_holds, .depth = join_depth, .look = join_look};
-  join.seams = &seams;
-  for (uint32_t i = 0; i < count; ++i) {
-    const hapi_hit *hit = &nearby->neighbors.hits[i];
-    if (hit->tool_count == 0 ||
-        !hapi_reserve((void **)&tools->parts, &tools->part_capacity, seams.count, 1,
-                      sizeof *tools->parts) ||
-        !hapi_reserve((void **)&tools->hits, &tools->hit_capacity, seams.count, 1,
-                      sizeof *tools->hits)) {
-      continue;
-    }
-    seams.parts = tools->parts;
-    tools->hits[seams.count] = i;
-    tools->parts[seams.count] =
-        (hapi_tool_part){.key = tools->points[hit->tool_first].tool.at.key,
-                         .hull = hit->pointer,
-                         .extent = hapi_state_pointers(nearby->cycle->state)[hit->pointer].extent};
-    seams.count += join_mark(&join, seams.count);
-  }
-  if (seams.count < 2) {
+  if (count < 2 || !hapi_reserve((void **)&tools->parts, &tools->part_capacity, 0, count,
+                                 sizeof *tools->parts)) {
     return;
   }
+  hapi_tool_seams seams = {.of = &join,
+                           .parts = tools->parts,
+                           .count = count,
+                           .holds = join_holds,
+                           .depth = join_depth,
+                           .look = join_look};
+  join.seams = &seams;
+  for (uint32_t i = 0; i < count; ++i) {
+    const hapi_tool_at *at = &tools->found[i].at;
+    tools->parts[i] =
+        (hapi_tool_part){.key = at->key, .hull = at->index, .extent = at->pointer->extent};
+    if (!join_mark(&join, i)) {
+      return;
+    }
+  }
   hapi_tool_seams_join(&seams);
-  for (uint32_t i = 0; i < seams.count; ++i) {
+  for (uint32_t i = 0; i < count; ++i) {
     join_keep(&join, i);
+  }
+}
+
+static bool found_reserve(hapi_tool_search *tools, uint32_t count)
+{
+  return hapi_reserve((void **)&tools->found, &tools->found_capacity, count, 1,
+                      sizeof *tools->found);
+}
+
+bool hapi_tool_look(hapi_nearby *nearby, const hapi_tool_at *at, uint32_t found)
+{
+  tool_search s;
+  if (!found_reserve(&nearby->tools, found)) {
+    return false;
+  }
+  search_begin(&s, nearby, at, &at->pointer->pose);
+  search_find(&s);
+  search_reduce(&s);
+  nearby->tools.found[found] = (hapi_tool_found){.at = *at, .pose = at->pointer->pose};
+  return store_points(nearby, &s, &nearby->tools.found[found]);
+}
+
+void hapi_tool_join_hits(hapi_nearby *nearby, uint32_t count)
+{
+  hapi_tool_search *tools = &nearby->tools;
+  hapi_hit *hits = nearby->neighbors.hits;
+  uint32_t found = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    if (hits[i].tool_count > 0 && !found_reserve(tools, found)) {
+      return;
+    }
+    if (hits[i].tool_count > 0) {
+      tools->found[found++] = (hapi_tool_found){
+          .at = {.geom = hits[i].geom,
+                 .index = hits[i].pointer,
+                 .pointer = &hapi_state_pointers(nearby->cycle->state)[hits[i].pointer],
+                 .hull = &hapi_state_hulls(nearby->cycle->state)[hits[i].pointer],
+                 .key = tools->points[hits[i].tool_first].tool.at.key,
+                 .reach = HUGE_VAL,
+                 .horizon = nearby->cycle->probe_step_s},
+          .pose = hits[i].tool_pose,
+          .first = hits[i].tool_first,
+          .count = hits[i].tool_count};
+    }
+  }
+  hapi_tool_join(nearby, found);
+  found = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    if (hits[i].tool_count > 0) {
+      hits[i].tool_first = tools->found[found].first;
+      hits[i].tool_count = tools->found[found++].count;
+    }
   }
 }
 

@@ -36,6 +36,14 @@ typedef struct hapi_tool_at {
   const hapi_tool_side *side; /* that it touches; NULL: none is known */
 } hapi_tool_at;
 
+/* The points of a hull beside a geom. */
+typedef struct hapi_tool_found {
+  hapi_tool_at at;
+  hap_pose pose;  /* of the hull */
+  uint32_t first; /* of the points of hapi_tool_search */
+  uint32_t count;
+} hapi_tool_found;
+
 /* Points of all hits of a cycle. */
 typedef struct hapi_tool_search {
   hapi_found_point *points;
@@ -45,8 +53,8 @@ typedef struct hapi_tool_search {
   uint32_t mark_capacity;
   hapi_tool_part *parts;
   uint32_t part_capacity;
-  uint32_t *hits; /* of the parts */
-  uint32_t hit_capacity;
+  hapi_tool_found *found; /* as many as parts */
+  uint32_t found_capacity;
   hapi_geom_names names;
   bool said_not_touched; /* of a user-made class by a hull, once a session */
 } hapi_tool_search;
@@ -54,11 +62,13 @@ typedef struct hapi_tool_search {
 /* m: how deep the pointer was in a geom, at the loop's newest message. */
 double hapi_tool_depth(const hapi_nearby *nearby, uint32_t pointer);
 bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *out);
-/* The points of a hull where the pointer's pose puts it, each with its gap; returns how many. */
-uint32_t hapi_tool_points(hapi_nearby *nearby, const hapi_tool_at *at,
-                          hapi_found_point out[HAPI_TOOL_SPOTS]);
-/* Where geoms adjoin under a hull, of the first hits: some may have no points left. */
+/* Adds the points of a hull where the pointer's pose puts it, for those found to be joined. False:
+ * no memory. */
+bool hapi_tool_look(hapi_nearby *nearby, const hapi_tool_at *at, uint32_t found);
+/* Where geoms adjoin under a hull, of the first found: some may have no points left. */
 void hapi_tool_join(hapi_nearby *nearby, uint32_t count);
+/* The same of the first hits of the model. */
+void hapi_tool_join_hits(hapi_nearby *nearby, uint32_t count);
 uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer);
 void hapi_tool_keep_places(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body);
 void hapi_tool_take(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body);
