@@ -157,7 +157,7 @@ static hap_status ticks_run(bench *b, hap_session *session, hap_pointer_id hand,
   return HAP_OK;
 }
 
-/* In real time: a frame of the application is a step of physics, but time passes slowly. */
+/* In real time: a frame of the application is a step of physics, in slow motion. */
 static hap_status frames_run(bench *b, hap_session *session, hap_pointer_id hand, run_state *run,
                              faults_run *out)
 {
@@ -175,11 +175,14 @@ static hap_status frames_run(bench *b, hap_session *session, hap_pointer_id hand
     scene->motion.hand(t, pose.position, twist.linear);
     hap_status status = hap_pointer_set_target(session, hand, &pose, &twist);
     if (status >= HAP_OK && i == 0) {
+      status = hap_session_set_time_scale(session, scene->slow);
+    }
+    if (status >= HAP_OK && i == 0) {
       status = hap_session_start(session);
     }
     if (status >= HAP_OK && t >= next_frame) {
       next_frame += frame_s;
-      status = hap_session_update(session, scene->slow * frame_s);
+      status = hap_session_update(session, frame_s);
     }
     at.tv_nsec += (long)(1e9 * FAULTS_TICK_S);
     at.tv_sec += at.tv_nsec / 1000000000;

@@ -52,12 +52,22 @@ static void add_new_impulse(hapi_local_body *body, const hapi_model_body *in)
   }
 }
 
-/* The loop lets go of the body: physics goes on from here. */
-static void body_disown(hapi_local_body *body, int64_t now_ns)
+static void twist_scale(double scale, hap_twist *io)
 {
+  hapi_v3_scale(scale, io->linear, io->linear);
+  hapi_v3_scale(scale, io->angular, io->angular);
+}
+
+/* The loop lets go of the body: physics goes on from here. */
+static void body_disown(hapi_local_body *body, const hapi_tick_facts *before)
+{
+  int64_t now_ns = before->now_ns;
   if ((body->flags & HAPI_BODY_OWNED) != 0) {
     body->left.pose = body->pose;
     body->left.twist = body->twist;
+    if (before->time_scale != 1.0) {
+      twist_scale(1.0 / before->time_scale, &body->left.twist); /* it moved: this is not 0 */
+    }
     body->owned_until_ns = now_ns;
     body->flags &= ~(uint32_t)HAPI_BODY_OWNED;
   }
@@ -81,14 +91,17 @@ static void take_given(hapi_local_body *body, const hapi_model_body *in)
 /* Model CONTACT: a body that the loop owned before keeps its motion; a new model replaces what is
  * known of it. One that has been let go keeps its pose until physics has had it. */
 static void adopt_contact_body(hapi_local_body *body, const hapi_model_body *in, double age_s,
-                               int64_t now_ns, uint64_t number)
+                               const hapi_tick_facts *before, uint64_t number)
 {
   bool same = body->generation == in->generation && body->epoch == in->epoch;
   bool owned = same && (body->flags & HAPI_BODY_OWNED) != 0;
   bool owns = (in->flags & HAPI_BODY_OWNED) != 0;
   uint32_t flags = in->flags;
   if (owned && !owns) {
-    body_disown(body, now_ns);
+    body_disown(body, before);
+    if ((in->flags & HAPI_BODY_DRIVEN) != 0) {
+      body->twist = in->twist;
+    }
   } else if (!owned) {
     body_enter(body, in, age_s);
     add_new_impulse(body, in);
@@ -131,7 +144,6 @@ static bool was_driven(const hapi_local_body *body, const hapi_body_course *cour
 static void adopt_body(hapi_local_body *body, const hapi_model *model, const hapi_model_body *in,
                        double age_s, const hapi_tick_facts *before)
 {
-  int64_t now_ns = before->now_ns;
   bool is_new = body->generation != in->generation;
   if (is_new) {
     memset(body, 0, sizeof *body);
@@ -146,11 +158,11 @@ static void adopt_body(hapi_local_body *body, const hapi_model *model, const hap
   bool was_linear = is_linear(before->model, body->flags);
   bool stays_linear = is_linear(model->model, in->flags);
   if (model->model == HAP_MODEL_CONTACT && !stays_linear) {
-    adopt_contact_body(body, in, age_s, now_ns, model->number);
+    adopt_contact_body(body, in, age_s, before, model->number);
     body->pushed = false;
     return;
   }
-  body_disown(body, now_ns);
+  body_disown(body, before);
   take_given(body, in);
   /* What a pointer pushed keeps the loop's state: a new model replaces what is known of the body,
    * never where the body is. */
@@ -173,7 +185,8 @@ static void adopt_body(hapi_local_body *body, const hapi_model *model, const hap
 }
 
 /* Bodies that are not in the new model. */
-static void bodies_leave(const hapi_bodies *bodies, hapi_model *model, int64_t now_ns)
+static void bodies_leave(const hapi_bodies *bodies, hapi_model *model,
+                         const hapi_tick_facts *before)
 {
   const hapi_model_body *in = hapi_model_bodies(model);
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
@@ -185,8 +198,20 @@ static void bodies_leave(const hapi_bodies *bodies, hapi_model *model, int64_t n
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     if (!body->live) {
-      body_disown(body, now_ns);
+      body_disown(body, before);
     }
+  }
+}
+
+/* Velocities are those of the hand's time. */
+static void bodies_change_time(const hapi_bodies *bodies, const hapi_model *model,
+                               const hapi_tick_facts *before)
+{
+  if (model->time_scale == before->time_scale || !(model->time_scale * before->time_scale > 0.0)) {
+    return; /* in a pause all are driven, and begin anew after it */
+  }
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    twist_scale(model->time_scale / before->time_scale, &bodies->of[bodies->live[i]].twist);
   }
 }
 
@@ -194,7 +219,8 @@ void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, int64_t now
                              const hapi_tick_facts *before)
 {
   const hapi_model_body *in = hapi_model_bodies(model);
-  bodies_leave(bodies, model, before->now_ns);
+  bodies_leave(bodies, model, before);
+  bodies_change_time(bodies, model, before);
   for (uint32_t i = 0; i < model->body_count; ++i) {
     HAPI_ASSERT_UNIT_QUAT(in[i].pose.quat_wxyz);
     hapi_local_body *body = &bodies->of[in[i].slot];

@@ -123,6 +123,19 @@ static void past_forget(hapi_course_past *past)
   memset(past->missed_set, 0, sizeof past->missed_set);
 }
 
+/* The steps have become longer or shorter: about what it would have gone in such ones. */
+static void past_stretch(hapi_course_past *past, double ratio)
+{
+  for (uint32_t i = 0; i < past->count; ++i) {
+    hapi_v3_scale(ratio, past->ways[i], past->ways[i]);
+    hapi_v3_scale(ratio, past->ways[i] + 3, past->ways[i] + 3);
+  }
+  for (int i = 0; i < ORDERS; ++i) {
+    past->missed[0][i] *= ratio;
+    past->missed[1][i] *= ratio;
+  }
+}
+
 void hapi_course_note(hapi_course_past *past, const hap_pose *pose, const hap_twist *twist,
                       double seconds)
 {
@@ -131,8 +144,8 @@ void hapi_course_note(hapi_course_past *past, const hap_pose *pose, const hap_tw
   if (seconds > 0.0 && past->known) {
     double way[6];
     way_between(&past->place, pose, now, way);
-    if (fabs(seconds - past->seconds) > 1e-6 * seconds) {
-      past_forget(past);
+    if (past->seconds > 0.0 && seconds != past->seconds) {
+      past_stretch(past, seconds / past->seconds);
     }
     bool jumps = guesses_try(past, way, 0);
     jumps = guesses_try(past, way, 1) || jumps;
@@ -267,4 +280,19 @@ void hapi_course_mean(const hapi_model_course *course, hap_twist *out)
   }
   hapi_v3_copy(rate, out->linear);
   hapi_v3_copy(rate + 3, out->angular);
+}
+
+void hapi_course_scale(double scale, hapi_model_course *io)
+{
+  double power = 1.0;
+  if (scale == 1.0) {
+    return;
+  }
+  io->period_s /= scale;
+  for (int k = 0; k < HAPI_COURSE_ORDER; ++k) {
+    power *= scale;
+    for (int i = 0; i < 6; ++i) {
+      io->ways[k][i] *= power;
+    }
+  }
 }

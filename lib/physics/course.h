@@ -31,6 +31,9 @@ void hapi_course_note(hapi_course_past *past, const hap_pose *pose, const hap_tw
 void hapi_course_find(const hapi_course_past *past, const hap_twist *twist, double period_s,
                       hapi_model_course *out);
 
+/* In a time that goes that much faster. */
+void hapi_course_scale(double scale, hapi_model_course *io);
+
 /* Its mean velocity in the period. */
 void hapi_course_mean(const hapi_model_course *course, hap_twist *out);
 

@@ -39,8 +39,11 @@ static void follow_model(hapi_physics *physics)
   hap_model wanted =
       hapi_tape_wanted_model(&physics->tape, &physics->wanted, &physics->cycle, false);
   double since_last = physics->cycle.probe_step_s;
+  physics->cycle.step_scale = physics->cycle.time_scale;
+  physics->cycle.time_scale = hapi_tape_wanted_scale(&physics->tape, &physics->wanted);
   physics->cycle.step_s = since_last + lead_of(&physics->config, wanted) -
                           lead_of(&physics->config, physics->cycle.model);
+  physics->cycle.step_s *= physics->cycle.step_scale;
   if (physics->cycle.step_s < 1e-9) {
     physics->cycle.step_s = 0.0;
   }
@@ -73,11 +76,10 @@ static void global_step(hapi_physics *physics)
   if (physics->cycle.step_s <= 0.0) {
     return;
   }
-  bool single = physics->cycle.model == HAP_MODEL_SINGLE;
   hapi_meant meant;
   hapi_sleep_step(&physics->world.bodies, physics->cycle.step_s);
   hapi_hold(&physics->account);
-  hapi_world_convert(&physics->world, single ? hapi_step_ratio(&physics->cycle) : 1.0, &meant);
+  hapi_world_convert(&physics->world, hapi_world_ratio(&physics->cycle), &meant);
   if (physics->cycle.model == HAP_MODEL_CONTACT) { /* the others are as they were published */
     hapi_flight_prepare(&physics->world, physics->cycle.step_s);
   }
@@ -183,8 +185,18 @@ void hapi_physics_test(hapi_physics *physics)
   }
 }
 
+/* It simulates in the hand's time alone. */
+static bool may_look_back(const hapi_cycle *cycle)
+{
+  return cycle->time_scale == 1.0 && cycle->step_scale == 1.0;
+}
+
 static void look_back(hapi_physics *physics, int64_t now_ns)
 {
+  if (!may_look_back(&physics->cycle)) {
+    hapi_lookback_reset(&physics->lookback);
+    return;
+  }
   const hapi_lookback_time time = {now_ns,
                                    hapi_dial_spare(&physics->dial, physics->cycle.probe_step_s),
                                    physics->dial.own_iterations};
@@ -234,7 +246,7 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[4] = stopwatch_lap(&watch);
   look_back(physics, now_ns);
   double looked_s = seconds[2] = stopwatch_lap(&watch);
-  if (physics->cycle.model == HAP_MODEL_IMPULSE) {
+  if (physics->cycle.model == HAP_MODEL_IMPULSE && may_look_back(&physics->cycle)) {
     hapi_lookback_open(&physics->lookback, now_ns);
   }
   hapi_reconcile_push(&physics->account);
@@ -254,9 +266,11 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_physics_test(physics);
   hapi_joint_probes(&physics->probe, &physics->world.joints, physics->near.range.number);
   seconds[2] += stopwatch_lap(&watch);
-  hapi_lookback_note(&physics->lookback);
+  if (may_look_back(&physics->cycle)) {
+    hapi_lookback_note(&physics->lookback);
+  }
   sync_out(physics, now_ns, next_ns);
-  if (physics->cycle.model != HAP_MODEL_IMPULSE) {
+  if (physics->cycle.model != HAP_MODEL_IMPULSE && may_look_back(&physics->cycle)) {
     hapi_lookback_open(&physics->lookback, now_ns);
   }
   hapi_dial_leave(&physics->dial, physics->world.ode.world);

@@ -71,6 +71,7 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   physics->wanted.latency_s = -1.0;
   atomic_init(&physics->wanted.model, (int)config->model);
   atomic_init(&physics->wanted.effects, config->effects);
+  atomic_init(&physics->wanted.time_scale, 1.0F);
   physics->lookback.cycle = &physics->cycle;
   physics->lookback.world = &physics->world;
   physics->lookback.near = &physics->near;
@@ -160,6 +161,8 @@ static void physics_prepare(hapi_physics *physics)
   physics->cycle.probe_step_s = hapi_config_period(&physics->config, physics->cycle.model);
   physics->cycle.state = NULL;
   physics->cycle.step_s = 0.0;
+  physics->cycle.time_scale = (double)atomic_load(&physics->wanted.time_scale);
+  physics->cycle.step_scale = physics->cycle.time_scale;
   physics->cycle.model_number = 0;
   physics->world_faulty = false;
   physics->world.bodies.said_lost = false;
@@ -331,6 +334,11 @@ void hapi_physics_set_effect(hapi_physics *physics, hap_effect effect, hap_effec
   while (!atomic_compare_exchange_weak(&physics->wanted.effects, &before,
                                        hapi_wish_set(before, effect, wish))) {
   }
+}
+
+void hapi_physics_set_time_scale(hapi_physics *physics, double scale)
+{
+  atomic_store(&physics->wanted.time_scale, (float)scale);
 }
 
 uint32_t hapi_physics_wanted_effects(hapi_physics *physics)

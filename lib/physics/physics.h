@@ -83,6 +83,7 @@ void hapi_physics_set_model(hapi_physics *physics, hap_model model); /* [any] */
 hap_model hapi_physics_wanted_model(hapi_physics *physics);          /* [any] */
 /* [any] From the next cycle on. */
 void hapi_physics_set_effect(hapi_physics *physics, hap_effect effect, hap_effect_wish wish);
+void hapi_physics_set_time_scale(hapi_physics *physics, double scale); /* [any] 0..1, likewise */
 uint32_t hapi_physics_wanted_effects(hapi_physics *physics); /* [any] as in base/wishes.h */
 /* [any] Its part of HAP_EFFECTS places. */
 void hapi_physics_effects(hapi_physics *physics, hap_effect_info *out);

@@ -26,7 +26,7 @@ static double keep_per_tick(const hapi_cycle *cycle, double damping)
   if (share == 0.0) {
     return 1.0;
   }
-  return pow(1.0 - share, hapi_step_ratio(cycle));
+  return pow(1.0 - share, hapi_tick_ratio(cycle));
 }
 
 /* What the loop needs to move the body itself. */
@@ -71,6 +71,41 @@ static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
   memcpy(out->response, answer->response, sizeof out->response);
 }
 
+static void vector_scale(double scale, double *io, int count)
+{
+  for (int i = 0; i < count; ++i) {
+    io[i] *= scale;
+  }
+}
+
+/* The loop is in the hand's time, in which a body of mass m goes s times as fast under the same
+ * forces as one of mass m / s^2 would. Impulses then are force times the hand's time. In a pause
+ * bodies are walls. */
+static void body_scale(double scale, hapi_model_body *io)
+{
+  if (scale == 1.0) {
+    return;
+  }
+  double slow2 = scale * scale;
+  hapi_v3_scale(scale, io->twist.linear, io->twist.linear);
+  hapi_v3_scale(scale, io->twist.angular, io->twist.angular);
+  vector_scale(slow2, io->b, 6);
+  vector_scale(slow2, io->gravity, 3);
+  vector_scale(slow2, io->response[0], 36);
+  io->linear_threshold2 *= slow2;
+  io->angular_threshold2 *= slow2;
+  io->max_angular_speed *= scale;
+  if (scale > 0.0) {
+    io->mass /= slow2;
+    vector_scale(1.0 / slow2, io->inertia, 9);
+    vector_scale(slow2, io->inverse_inertia, 9);
+  } else {
+    const uint32_t roles = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_RESTING |
+                           HAPI_BODY_WHOLE | HAPI_BODY_ALONE | HAPI_BODY_GYROSCOPIC;
+    io->flags = (io->flags & ~roles) | HAPI_BODY_DRIVEN;
+  }
+}
+
 static bool is_zero(const hap_twist *twist)
 {
   return hapi_v3_dot(twist->linear, twist->linear) == 0.0 &&
@@ -84,12 +119,17 @@ static void fill_course(const publishing *p, hapi_slot_account *of, hapi_model *
 {
   hapi_model_course *course = &hapi_model_courses(model)[model->course_count];
   double period = p->cycle->probe_step_s;
+  double scale = p->cycle->time_scale;
   hapi_course_note(&of->course, &out->pose, &out->twist, p->cycle->step_s);
-  hapi_course_find(&of->course, &out->twist, period, course);
+  if (!(scale > 0.0)) {
+    return; /* a pause: it stands */
+  }
+  hapi_course_find(&of->course, &out->twist, scale * period, course);
   if (is_zero(&out->twist)) {
     hapi_course_mean(course, &out->twist);
   }
   if (p->cycle->model == HAP_MODEL_CONTACT) {
+    hapi_course_scale(scale, course);
     out->course = ++model->course_count;
   }
 }
@@ -125,6 +165,7 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, ha
       hapi_v3_copy(of->falls, out->b); /* over the age of the model, when it comes in */
     }
   }
+  body_scale(p->cycle->time_scale, out);
   bool sound = hapi_pose_is_sound(body) && hapi_finite(out->twist.linear, 3) &&
                hapi_finite(out->twist.angular, 3);
   p->account->counts.states_rejected += !sound;
@@ -167,6 +208,15 @@ static bool fill_tool(const publishing *p, const hapi_contact_slot *slot, hapi_m
   return true;
 }
 
+/* As the bodies. */
+static void contact_scale(double scale, hapi_model_contact *io)
+{
+  if (scale != 1.0) {
+    vector_scale(scale * scale, io->a[0], 18);
+    vector_scale(scale * scale, io->turn, 6);
+  }
+}
+
 static void publish_contacts(const publishing *p, hapi_model *out)
 {
   hapi_model_contact *contacts = hapi_model_contacts(out);
@@ -178,6 +228,7 @@ static void publish_contacts(const publishing *p, hapi_model *out)
       HAPI_ASSERT_INDEX(out->contact_count, p->cycle->config->capacity.contacts);
       hapi_model_contact *contact = &contacts[out->contact_count];
       fill_contact(slot, &p->answers->contacts[i], i, contact);
+      contact_scale(p->cycle->time_scale, contact);
       out->contact_count += fill_tool(p, slot, out, contact);
     }
   }
@@ -218,7 +269,8 @@ static const hapi_body_slot *slot_of(const publishing *p, uint32_t body)
 static hapi_softness softness_of(const publishing *p, double erp, double cfm)
 {
   hapi_softness out = {erp, cfm, cfm > SOFT_CFM};
-  hapi_soften(hapi_step_ratio(p->cycle), &out.erp, &out.cfm);
+  hapi_soften(hapi_tick_ratio(p->cycle), &out.erp, &out.cfm);
+  out.cfm *= hapi_cycle_scale(p->cycle);
   return out;
 }
 
@@ -244,9 +296,9 @@ static void fill_limit(const publishing *p, dJointID joint, parameter_fn get, in
   out->bounce = hapi_wish_is_off(p->cycle->wishes, HAP_EFFECT_RESTITUTION)
                     ? 0.0
                     : get(joint, dParamBounce + group);
-  out->speed = get(joint, dParamVel + group);
+  out->speed = hapi_cycle_scale(p->cycle) * get(joint, dParamVel + group);
   out->force = get(joint, dParamFMax + group);
-  out->motor_cfm = get(joint, dParamCFM + group);
+  out->motor_cfm = hapi_cycle_scale(p->cycle) * get(joint, dParamCFM + group);
   out->fudge = get(joint, dParamFudgeFactor + group);
   bool drives = out->force > 0.0 && (out->flags & HAPI_LIMIT_LOCKED) == 0;
   out->flags |= drives ? HAPI_LIMIT_MOTOR : 0u;
@@ -275,6 +327,19 @@ static void fill_parameters(const publishing *p, const hapi_known_joint *known,
   }
 }
 
+static void measured_scale(double scale, hapi_measured_joint *io)
+{
+  if (scale == 1.0) {
+    return;
+  }
+  io->ahead_s /= scale;
+  for (uint32_t i = 0; i < io->row_count; ++i) {
+    io->rows[i].softness.cfm *= scale;
+    io->rows[i].speed *= scale;
+    io->rows[i].impulse /= scale;
+  }
+}
+
 static void joint_fill(const publishing *p, const hapi_known_joint *known, hapi_model_joint *out)
 {
   HAPI_ASSERT_INDEX(known->slot, p->world->joints.slot_count);
@@ -295,6 +360,7 @@ static void joint_fill(const publishing *p, const hapi_known_joint *known, hapi_
     out->kind = HAPI_JOINT_MEASURED;
     out->place = measured->place;
     out->measured = measured->found;
+    measured_scale(hapi_cycle_scale(p->cycle), &out->measured);
     hapi_joint_axis axes[HAPI_JOINT_LIMITS] = {{0}};
     int count = hapi_joint_axes(known, axes);
     for (int i = 0; i < count; ++i) {
@@ -344,6 +410,7 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
   out->sent_ns = hapi_tape_sent(&physics->tape, cycle);
   out->period_s = hapi_config_period(
       &physics->config, hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, true));
+  out->time_scale = cycle->time_scale;
   out->tick_budget_ns = hapi_dial_tick_budget(&physics->dial, physics->config.haptic_hz);
   hapi_model_body *bodies = hapi_model_bodies(out);
   out->body_count = out->course_count = 0;
@@ -358,6 +425,9 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
   out->cross_count = 0;
   for (uint32_t i = 0; i < out->contact_count; ++i) {
     hapi_cross_publish(&physics->cross, hapi_model_contacts(out)[i].slot, i, out);
+  }
+  for (uint32_t i = 0; i < out->cross_count && cycle->time_scale != 1.0; ++i) {
+    vector_scale(cycle->time_scale * cycle->time_scale, hapi_model_crosses(out)[i].a[0], 18);
   }
   const hapi_range *range = &physics->near.range;
   int64_t begin_ns = hapi_clock_now();

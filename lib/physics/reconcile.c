@@ -58,8 +58,27 @@ static bool is_pushed(const double v[3])
   return v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0;
 }
 
+/* What the loop says is in the hand's time. In a pause it gives nothing and moves nothing. */
+static double state_scale(const hapi_account *account)
+{
+  double scale = account->cycle->state->time_scale;
+  return scale > 0.0 ? scale : 1.0;
+}
+
+static hap_twist state_twist(const hapi_account *account, const hapi_state_body *in)
+{
+  hap_twist out = in->twist;
+  double scale = state_scale(account);
+  if (scale != 1.0) {
+    hapi_v3_scale(1.0 / scale, out.linear, out.linear);
+    hapi_v3_scale(1.0 / scale, out.angular, out.angular);
+  }
+  return out;
+}
+
 /* The totals' growth since the last message. */
-static void take_impulse(hapi_slot_account *of, hapi_body_slot *slot, const hapi_state_body *in)
+static void take_impulse(const hapi_account *account, hapi_slot_account *of, hapi_body_slot *slot,
+                         const hapi_state_body *in)
 {
   HAPI_ASSERT(of->generation == slot->generation && in->generation == slot->generation);
   double linear[3];
@@ -69,8 +88,8 @@ static void take_impulse(hapi_slot_account *of, hapi_body_slot *slot, const hapi
   hapi_v3_copy(in->impulse, of->impulse_taken);
   hapi_v3_copy(in->angular_impulse, of->angular_impulse_taken);
   /* What an earlier cycle could not give, because it had no step, is still there. */
-  hapi_v3_add(of->new_impulse, linear, of->new_impulse);
-  hapi_v3_add(of->new_angular_impulse, angular, of->new_angular_impulse);
+  hapi_v3_madd(of->new_impulse, state_scale(account), linear, of->new_impulse);
+  hapi_v3_madd(of->new_angular_impulse, state_scale(account), angular, of->new_angular_impulse);
   slot->pushed = is_pushed(linear) || is_pushed(angular);
 }
 
@@ -107,7 +126,7 @@ static void write_off(hapi_account *account, hapi_slot_account *of, hapi_body_sl
                       const hapi_state_body *in)
 {
   if (state_is_sound(in)) {
-    take_impulse(of, slot, in);
+    take_impulse(account, of, slot, in);
     hapi_v3_add(account->counts.world_impulse, of->new_impulse, account->counts.world_impulse);
     memset(of->new_impulse, 0, sizeof of->new_impulse);
     memset(of->new_angular_impulse, 0, sizeof of->new_angular_impulse);
@@ -138,7 +157,7 @@ static void take_body(hapi_account *account, uint32_t index)
     hapi_slots_renew(slot);
     return;
   }
-  take_impulse(of, slot, in);
+  take_impulse(account, of, slot, in);
   slot->loop_owned = (in->flags & HAPI_BODY_OWNED) != 0 && in->epoch == slot->epoch;
   if (slot->loop_owned) {
     hapi_bodies_own(&account->world->bodies, slot->known, true,
@@ -214,7 +233,8 @@ static void take_last_state(const hapi_account *account, const hapi_slot_account
                             const hapi_body_slot *slot, dBodyID body, const hapi_state_body *in)
 {
   hap_pose pose = in->owned_pose;
-  double since = 1e-9 * (double)(in->owned_until_ns - account->cycle->last_cycle_ns);
+  double since = account->cycle->step_scale * 1e-9 *
+                 (double)(in->owned_until_ns - account->cycle->last_cycle_ns);
   since = since > account->cycle->step_s ? account->cycle->step_s : since < 0.0 ? 0.0 : since;
   hapi_v3_madd(pose.position, -since, in->owned_twist.linear, pose.position);
   hap_twist twist = in->owned_twist;
@@ -237,7 +257,8 @@ void hapi_reconcile_own(hapi_account *account)
       continue;
     }
     if (slot->loop_owned) {
-      set_state(slot, body, &in->pose, &in->twist);
+      hap_twist twist = state_twist(account, in);
+      set_state(slot, body, &in->pose, &twist);
       bool told = of->placed && of->left_enabled; /* by the application to sleep */
       if ((in->flags & HAPI_BODY_RESTING) == 0 && !dBodyIsEnabled(body) && !told) {
         dBodyEnable(body);
@@ -270,7 +291,8 @@ void hapi_reconcile_push(hapi_account *account)
       }
       dBodyAddForce(body, p[0] * rate, p[1] * rate, p[2] * rate);
       dBodyAddTorque(body, l[0] * rate, l[1] * rate, l[2] * rate);
-      hapi_v3_add(account->counts.world_impulse, p, account->counts.world_impulse);
+      hapi_v3_madd(account->counts.world_impulse, 1.0 / account->cycle->step_scale, p,
+                   account->counts.world_impulse);
       hapi_v3_scale(rate, p, slot->exchanged);
       hapi_v3_scale(rate, l, slot->exchanged + 3);
       memset(of->new_impulse, 0, sizeof of->new_impulse);
@@ -317,7 +339,7 @@ void hapi_reconcile_residual(hapi_account *account)
     hapi_v3_copy(in->twist.linear, loop);
     hapi_v3_copy(in->twist.angular, loop + 3);
     for (int k = 0; k < 6; ++k) {
-      of->residual[k] = there[k] - loop[k] + in->residual[k];
+      of->residual[k] = state_scale(account) * there[k] - loop[k] + in->residual[k];
     }
   }
 }

@@ -29,6 +29,24 @@ static void note_commit(hapi_taping *taping)
   taping->note = NULL;
 }
 
+/* The bits of a time scale are kept against those of 1, which older recordings have. */
+static uint32_t scale_bits(float scale)
+{
+  const float one = 1.0F;
+  uint32_t bits[2];
+  memcpy(&bits[0], &scale, sizeof scale);
+  memcpy(&bits[1], &one, sizeof one);
+  return bits[0] ^ bits[1];
+}
+
+static float bits_scale(uint32_t kept)
+{
+  float scale;
+  uint32_t bits = kept ^ scale_bits(0.0F);
+  memcpy(&scale, &bits, sizeof scale);
+  return scale >= 0.0F && scale <= 1.0F ? scale : 1.0F; /* of a file from outside */
+}
+
 /* ---- the world at the start ---- */
 
 static uint64_t hash_geom(uint64_t hash, dGeomID geom)
@@ -105,13 +123,13 @@ static hap_status other_world(const hapi_cell *there, const hapi_cell *here, hap
                    "and %llu joints, this one has %llu, %llu and %llu%s; build the one of the "
                    "recording",
                    (unsigned long long)there->u[HAPI_WORLD_BODIES],
-                   (unsigned long long)there->u[HAPI_WORLD_GEOMS],
+                   (unsigned long long)(there->u[HAPI_WORLD_GEOMS] & LOW_HALF),
                    (unsigned long long)there->u[HAPI_WORLD_JOINTS],
                    (unsigned long long)here->u[HAPI_WORLD_BODIES],
                    (unsigned long long)here->u[HAPI_WORLD_GEOMS],
                    (unsigned long long)here->u[HAPI_WORLD_JOINTS],
                    there->u[HAPI_WORLD_BODIES] == here->u[HAPI_WORLD_BODIES] &&
-                           there->u[HAPI_WORLD_GEOMS] == here->u[HAPI_WORLD_GEOMS]
+                           (there->u[HAPI_WORLD_GEOMS] & LOW_HALF) == here->u[HAPI_WORLD_GEOMS]
                        ? ", but in other places, of other masses or shapes, or with other settings"
                        : "");
 }
@@ -134,6 +152,8 @@ hap_status hapi_tape_world(hapi_taping *taping, const hapi_world *world, hapi_wa
     taping->note->u[HAPI_WORLD_SEED] = dRandGetSeed();
     taping->note->flags = (uint16_t)atomic_load(&wanted->model);
     taping->note->word = atomic_load(&wanted->effects);
+    taping->note->u[HAPI_WORLD_GEOMS] |= (uint64_t)scale_bits(atomic_load(&wanted->time_scale))
+                                         << 32;
     return HAP_OK;
   }
   taping->read = hapi_tape_get(taping->tape, HAPI_CELL_WORLD, 0);
@@ -146,6 +166,8 @@ hap_status hapi_tape_world(hapi_taping *taping, const hapi_world *world, hapi_wa
     atomic_store(&wanted->model, (int)model);
   }
   atomic_store(&wanted->effects, taping->read->word);
+  atomic_store(&wanted->time_scale,
+               bits_scale((uint32_t)(taping->read->u[HAPI_WORLD_GEOMS] >> 32)));
   return HAP_OK;
 }
 
@@ -302,13 +324,13 @@ void hapi_tape_cycle(hapi_taping *taping, hapi_wanted *wanted, int64_t now_ns, i
     taping->note->u[HAPI_CYCLE_SEED] = dRandGetSeed();
     taping->note->u[HAPI_CYCLE_LOCKS] = taping->locks;
     taping->note->u[HAPI_CYCLE_MISSED] = taping->missed_unrecorded;
-    taping->note->u[HAPI_CYCLE_DROPPED] = taping->dropped_unrecorded;
+    taping->note->u[HAPI_CYCLE_DROPPED] = taping->dropped_unrecorded & LOW_HALF;
   } else if (hapi_tape_plays(taping->tape)) {
     taping->read = hapi_tape_get(taping->tape, HAPI_CELL_CYCLE, 0);
     taping->read_end = hapi_tape_get(taping->tape, HAPI_CELL_CYCLED, 0);
     dRandSetSeed((unsigned long)taping->read->u[HAPI_CYCLE_SEED]);
     taping->played_missed += taping->read->u[HAPI_CYCLE_MISSED] & LOW_HALF;
-    taping->played_dropped += taping->read->u[HAPI_CYCLE_DROPPED];
+    taping->played_dropped += taping->read->u[HAPI_CYCLE_DROPPED] & LOW_HALF;
   }
   taping->locks = 0;
   taping->missed_unrecorded = 0;
@@ -327,6 +349,20 @@ uint32_t hapi_tape_wanted_effects(hapi_taping *taping, hapi_wanted *wanted)
     *word = (*word & LOW_HALF) | (uint64_t)effects << 32;
   }
   return effects;
+}
+
+double hapi_tape_wanted_scale(hapi_taping *taping, hapi_wanted *wanted)
+{
+  if (hapi_tape_plays(taping->tape) && taping->read->kind == HAPI_CELL_CYCLE) {
+    uint64_t word = taping->read->u[HAPI_CYCLE_DROPPED];
+    atomic_store(&wanted->time_scale, bits_scale((uint32_t)(word >> 32)));
+  }
+  float scale = atomic_load(&wanted->time_scale);
+  if (cycle_note(taping) != NULL) {
+    uint64_t *word = &taping->note->u[HAPI_CYCLE_DROPPED];
+    *word = (*word & LOW_HALF) | (uint64_t)scale_bits(scale) << 32;
+  }
+  return (double)scale;
 }
 
 void hapi_tape_dials(hapi_taping *taping, int io_percent[2])

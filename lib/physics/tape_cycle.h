@@ -34,6 +34,7 @@ typedef struct hapi_taping {
 typedef struct hapi_wanted {
   _Atomic int model;
   _Atomic uint32_t effects; /* base/wishes.h */
+  _Atomic float time_scale; /* as a recording keeps it */
   double latency_s;         /* negative: the model's own */
 } hapi_wanted;
 
@@ -49,6 +50,7 @@ void hapi_tape_state(hapi_taping *taping, const hapi_exchange *exchange, bool ta
 hap_model hapi_tape_wanted_model(hapi_taping *taping, hapi_wanted *wanted, const hapi_cycle *cycle,
                                  bool at_end);
 uint32_t hapi_tape_wanted_effects(hapi_taping *taping, hapi_wanted *wanted);
+double hapi_tape_wanted_scale(hapi_taping *taping, hapi_wanted *wanted);
 /* Positions of both dials [percent]: to the recording, or from it. */
 void hapi_tape_dials(hapi_taping *taping, int io_percent[2]);
 /* The same of what both begin at. */

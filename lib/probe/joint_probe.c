@@ -154,9 +154,10 @@ static bool pair_begin(pair *p, hapi_probe *probe, hapi_known_joint *known)
   p->world = probe->world->ode.world;
   p->known = known;
   p->m = known->measurement;
-  p->period = 1.0 / config->haptic_hz;
-  p->ahead_s = 0.5 * probe->cycle->probe_step_s;
-  p->ratio = config->physics_hz / config->haptic_hz;
+  double scale = hapi_cycle_scale(probe->cycle);
+  p->period = scale / config->haptic_hz;
+  p->ahead_s = 0.5 * scale * probe->cycle->probe_step_s;
+  p->ratio = hapi_tick_ratio(probe->cycle);
   bool second = known->bodies[0] == NULL || dBodyIsKinematic(known->bodies[0]);
   uint32_t first = second ? 1 : 0;
   p->m->good = p->m->good && p->m->first == first;

@@ -63,7 +63,7 @@ typedef enum hapi_world_word {
   HAPI_WORLD_HASH = 2,
   HAPI_WORLD_BODIES = 3,
   HAPI_WORLD_JOINTS = 4,
-  HAPI_WORLD_GEOMS = 5,
+  HAPI_WORLD_GEOMS = 5,     /* low half; high half: the time scale, as in HAPI_CYCLE_DROPPED */
   HAPI_WORLD_MODEL_HASH = 6 /* of the first local model */
 } hapi_world_word;
 
@@ -76,7 +76,8 @@ typedef enum hapi_cycle_word {
       4, /* low half: hap_session_lock since the cycle before; high half: effects wished
                             for, as in base/wishes.h */
   HAPI_CYCLE_MISSED = 5, /* low half: steps, likewise; high half: hapi_cycle_dials */
-  HAPI_CYCLE_DROPPED = 6 /* drive FRAME: steps that frames had too much, likewise */
+  HAPI_CYCLE_DROPPED = 6 /* low half: in drive FRAME, steps that frames had too much, likewise; high
+                            half: the time scale as a float, its bits against those of 1 */
 } hapi_cycle_word;
 
 /* Positions of the dials of a cycle [percent], each + 1 in a byte; 0, of a recording without: the

@@ -13,6 +13,8 @@
 #include "base/thread.h"
 #include "session/frame_clock.h"
 
+#define TIME_SCALE_LEAST 1e-3 /* masses go with its inverse square */
+
 const char *hap_model_name(hap_model model)
 {
   switch (model) {
@@ -407,6 +409,18 @@ hap_status hap_session_set_model(hap_session *session, hap_model model)
     return HAP_ERROR_ARGUMENT;
   }
   hapi_physics_set_model(session->physics, model);
+  return HAP_OK;
+}
+
+hap_status hap_session_set_time_scale(hap_session *session, double scale)
+{
+  HAPI_TRY(hapi_session_may_change(session));
+  if (!(scale == 0.0 || (scale >= TIME_SCALE_LEAST && scale <= 1.0))) { /* NaN too */
+    return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
+                             "a time scale of %g: 0 for a pause, or %g to 1", scale,
+                             TIME_SCALE_LEAST);
+  }
+  hapi_physics_set_time_scale(session->physics, scale);
   return HAP_OK;
 }
 

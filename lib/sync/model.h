@@ -202,6 +202,7 @@ typedef struct hapi_model {
   int64_t sent_ns;       /* drive FRAME: when physics computed, state_ns or later; else 0 */
   double blend_s;        /* model IMPULSE, interpolated: how long a body takes to its new pose */
   double period_s;       /* H, of the next step */
+  double time_scale;     /* what passes for bodies in a second; theirs here is the hand's time */
   hap_model model;
   hap_impulse_pose impulse_pose;
   uint32_t wishes;        /* of the effects, base/wishes.h */

@@ -34,7 +34,7 @@ typedef struct hapi_state_body {
   double gain[6]; /* N s, N m s, running total: what pointers gave while the loop owned it */
   int64_t owned_until_ns; /* last tick in which the loop owned it; 0: none */
   hap_pose owned_pose;    /* at that tick */
-  hap_twist owned_twist;
+  hap_twist owned_twist;  /* in the world's time */
 } hapi_state_body;
 
 typedef struct hapi_state_contact {
@@ -84,6 +84,7 @@ typedef struct hapi_state {
   uint64_t tick;           /* the next one */
   uint64_t model_number;   /* the local model in use; 0: none yet */
   int64_t now_ns;          /* time for which the poses hold */
+  double time_scale;       /* of that model: velocities and impulses are in the hand's time */
   double hand_impulse[3];  /* N s, given to bodies that can move by all pointers since start */
   double owned_impulse[3]; /* N s, what the loop's bodies got of it, and from bodies of ODE */
   hapi_tick_load load;

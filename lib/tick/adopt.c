@@ -84,6 +84,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   facts->state_ns = model->state_ns;
   facts->sent_ns = model->sent_ns;
   facts->physics_period = model->period_s;
+  facts->time_scale = model->time_scale;
   watch->count = model->watch_count;
   memcpy(watch->slot, model->watch_slot, sizeof watch->slot);
   memcpy(watch->position, model->watch_position, sizeof watch->position);

@@ -159,6 +159,7 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   hapi_v3_copy(tick->touches.hand_impulse, out->hand_impulse);
   hapi_v3_copy(tick->bodies.owned_impulse, out->owned_impulse);
   out->now_ns = tick->facts.now_ns;
+  out->time_scale = tick->facts.time_scale;
   out->model_number = tick->facts.model_number;
   out->model = tick->facts.model;
   report_bodies(&tick->bodies, out);

@@ -65,7 +65,8 @@ void hapi_tick_reset(hapi_tick *tick)
   }
   hapi_touches *touches = &tick->touches;
   hapi_solver *solver = &tick->rows.solver;
-  tick->facts = (hapi_tick_facts){.period = tick->facts.period, .observes = true};
+  tick->facts =
+      (hapi_tick_facts){.period = tick->facts.period, .observes = true, .time_scale = 1.0};
   tick->pointers.high = tick->capacity.pointers;
   tick->pointers.proxies = false;
   tick->bodies = (hapi_bodies){

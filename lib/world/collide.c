@@ -23,15 +23,15 @@ static void set_direction(dContact *contact, const double direction[3])
   }
 }
 
-/* A surface that is soft for the world's step, in a world that model SINGLE steps at another. */
+/* A surface that is soft for the world's step, in a world that is stepped at another. */
 static void surface_soften(const hapi_world *world, const hapi_cycle *cycle, dSurfaceParameters *s)
 {
-  if (cycle->model != HAP_MODEL_SINGLE || (s->mode & (dContactSoftERP | dContactSoftCFM)) == 0) {
+  if (hapi_world_ratio(cycle) == 1.0 || (s->mode & (dContactSoftERP | dContactSoftCFM)) == 0) {
     return;
   }
   double erp = (s->mode & dContactSoftERP) != 0 ? s->soft_erp : dWorldGetERP(world->ode.world);
   double cfm = (s->mode & dContactSoftCFM) != 0 ? s->soft_cfm : dWorldGetCFM(world->ode.world);
-  hapi_soften(hapi_step_ratio(cycle), &erp, &cfm);
+  hapi_soften(hapi_world_ratio(cycle), &erp, &cfm);
   s->soft_erp = erp;
   s->soft_cfm = cfm;
   s->mode |= dContactSoftERP | dContactSoftCFM;

@@ -21,6 +21,8 @@ typedef struct hapi_cycle {
   uint32_t wishes;     /* effects, base/wishes.h */
   double step_s;       /* of this cycle's global step */
   double probe_step_s; /* H */
+  double time_scale;   /* of the interval to come: what passes for bodies in a second of the hand */
+  double step_scale;   /* the same of this cycle's step */
   uint64_t model_number;
   int64_t last_cycle_ns; /* time of the last cycle, for which ODE's state holds */
   hapi_state *state;     /* newest message of the loop; NULL: none yet */
@@ -31,6 +33,12 @@ typedef struct hapi_cycle {
 static inline bool hapi_cycle_steps_to_now(const hapi_cycle *cycle)
 {
   return cycle->model != HAP_MODEL_IMPULSE;
+}
+
+/* In a pause nothing is converted: no body moves. */
+static inline double hapi_cycle_scale(const hapi_cycle *cycle)
+{
+  return cycle->time_scale > 0.0 ? cycle->time_scale : 1.0;
 }
 
 /* To the log and the application, unless *io_said. */

@@ -9,7 +9,7 @@
 
 /* ODE's error reduction, constraint softness and damping are meant for the step of the world. What
  * is stepped at the haptic rate, the loop's contacts and the world itself in model SINGLE, needs
- * those of another step with the same effect. */
+ * those of another step with the same effect. So does the world in slow motion. */
 
 /* erp = h k / (h k + d), cfm = 1 / (h k + d) for a spring k and a damper d (ODE's manual). */
 void hapi_soften(double ratio, double *erp, double *cfm)
@@ -99,6 +99,17 @@ void hapi_joint_restore(const hapi_known_joint *known)
 double hapi_step_ratio(const hapi_cycle *cycle)
 {
   return cycle->config->physics_hz / cycle->config->haptic_hz;
+}
+
+double hapi_tick_ratio(const hapi_cycle *cycle)
+{
+  return hapi_step_ratio(cycle) * hapi_cycle_scale(cycle);
+}
+
+double hapi_world_ratio(const hapi_cycle *cycle)
+{
+  double ratio = cycle->model == HAP_MODEL_SINGLE ? hapi_step_ratio(cycle) : 1.0;
+  return cycle->step_scale > 0.0 ? ratio * cycle->step_scale : ratio;
 }
 
 void hapi_world_convert(const hapi_world *world, double ratio, hapi_meant *out)

@@ -165,18 +165,20 @@ static void fill_surface(dWorldID world, const hapi_cycle *cycle, const dSurface
     flags |= (s->mode & bits[i].mode) != 0 ? bits[i].flag : 0u;
   }
   out->flags = flags;
-  hapi_soften(hapi_step_ratio(cycle), &out->erp, &out->cfm);
+  double scale = hapi_cycle_scale(cycle); /* the loop's velocities are those of the hand's time */
+  hapi_soften(hapi_tick_ratio(cycle), &out->erp, &out->cfm);
+  out->cfm *= scale;
   out->mu = s->mu;
   out->mu2 = (s->mode & dContactMu2) != 0 ? s->mu2 : s->mu;
   out->bounce = s->bounce;
-  out->bounce_speed = s->bounce_vel;
+  out->bounce_speed = scale * s->bounce_vel;
   out->layer = dWorldGetContactSurfaceLayer(world);
-  out->max_push = dWorldGetContactMaxCorrectingVel(world);
-  out->motion[0] = (s->mode & dContactMotion1) != 0 ? s->motion1 : 0.0;
-  out->motion[1] = (s->mode & dContactMotion2) != 0 ? s->motion2 : 0.0;
-  out->motion[2] = (s->mode & dContactMotionN) != 0 ? s->motionN : 0.0;
-  out->slip[0] = s->slip1;
-  out->slip[1] = s->slip2;
+  out->max_push = scale * dWorldGetContactMaxCorrectingVel(world);
+  out->motion[0] = (s->mode & dContactMotion1) != 0 ? scale * s->motion1 : 0.0;
+  out->motion[1] = (s->mode & dContactMotion2) != 0 ? scale * s->motion2 : 0.0;
+  out->motion[2] = (s->mode & dContactMotionN) != 0 ? scale * s->motionN : 0.0;
+  out->slip[0] = scale * s->slip1;
+  out->slip[1] = scale * s->slip2;
 }
 
 bool hapi_world_surface(const hapi_world *world, const hapi_cycle *cycle, hapi_link *link)
