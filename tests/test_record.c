@@ -425,6 +425,21 @@ TEST(changes_of_model)
   (void)check_setup(&s);
 }
 
+static void change_time(rig *r, int look)
+{
+  static const double scales[] = {0.3, 0.0, 0.1, 1.0};
+  if (look % 2 == 1) {
+    CHECK(hap_session_set_time_scale(r->session, scales[look / 2 % 4]) == HAP_OK);
+  }
+}
+
+TEST(changes_of_time)
+{
+  recorded_setup s = recorded_setup_of("stack", HAP_MODEL_CONTACT, 900);
+  s.meanwhile = change_time;
+  (void)check_setup(&s);
+}
+
 static hap_pointer_id guest;
 
 static void make_trouble(rig *r, int look)
