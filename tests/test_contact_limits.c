@@ -281,3 +281,40 @@ TEST(sweeps_are_no_more_than_asked)
   CHECK(undone[1] > 10.0 * undone[0]);
   CHECK(sweeps[3] == sweeps[0] && undone[3] == undone[0]);
 }
+
+/* A row of cubes of which the loop has six: how many testing simulations a step of physics has, and
+ * how many bodies answer as they say. */
+static double border_steps(int iterations, uint32_t *out_measured)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  dWorldSetQuickStepNumIterations(w->world, iterations);
+  w->def.max_bodies = 6;
+  w->def.physics_hz = 60.0;
+  cw_add_floor(w);
+  for (int i = 0; i < 30; ++i) {
+    cw_add_cube(w, 0.2, 0.05, 0.025 + 0.0499 * i, 0.0, 0.0249);
+  }
+  cw_start(w, -0.011, 0.0, 0.025);
+  cw_move_hand(w, 0.05, 0.0, 0.0);
+  *out_measured = 0;
+  for (int i = 0; i < 500; ++i) {
+    cw_tick(w);
+    uint32_t measured = cw_stats(w).model.measured_bodies;
+    *out_measured = measured > *out_measured ? measured : *out_measured;
+  }
+  hap_stats stats = cw_stats(w);
+  CHECK(stats.model.range_bodies == 6 && stats.faults.count == 0 && w->force[0] < -1.0);
+  double steps = (double)stats.probes.steps / (double)stats.physics.steps;
+  printf("# %d iterations: %.2f testing simulations a step, %u bodies measured\n", iterations,
+         steps, *out_measured);
+  cw_close(w);
+  return steps;
+}
+
+/* Islands that take ODE long are measured now and then, and keep what was found. */
+TEST(probes_at_the_border_have_a_budget)
+{
+  uint32_t measured;
+  CHECK(border_steps(5, &measured) > 3.0 && measured == 1);
+  CHECK(border_steps(400, &measured) < 2.0 && measured == 1);
+}

@@ -53,10 +53,10 @@ typedef struct hap_session_def {
   /* Hz, 1..1000 and at most haptic_hz, default 60: steps of the world. Not used by model SINGLE */
   double physics_hz;
   double haptic_hz; /* Hz, 100..20000, default 1000: ticks of the loop */
-  /* bodies that the loop moves itself, 1..1024, default 64. It knows as many again of those
+  /* bodies that the loop moves itself, 1..1024, default 128. It knows as many again of those
    * around them */
   int32_t max_bodies;
-  /* 1..4096, default 1024: of contact points between bodies, of pairs of nearby geoms, and of
+  /* 1..4096, default 2048: of contact points between bodies, of pairs of nearby geoms, and of
    * pointer contacts, this many each. The contact points nearest to a touch are kept: give at
    * least 12 for each of max_bodies */
   int32_t max_contacts;

@@ -127,6 +127,7 @@ static void state_report(hapi_haptic *haptic)
   hapi_state *state = hapi_exchange_state_back(haptic->config.exchange);
   hapi_tick_report(&haptic->tick, state);
   state->load = haptic->load;
+  state->unsolved = haptic->tick.rows.unsolved_most;
   hapi_exchange_state_publish(haptic->config.exchange);
 }
 

@@ -34,6 +34,8 @@ typedef struct hapi_rows {
   uint32_t capacity;
   double residual_max; /* m/s; this and the next since start */
   uint64_t sweeps;
+  uint32_t unsolved;      /* ticks in a row of which HAPI_UNSOLVED or more was left undone */
+  uint32_t unsolved_most; /* since start */
 } hapi_rows;
 
 /* What a unit impulse along j does to the body's velocity. */

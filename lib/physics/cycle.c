@@ -208,6 +208,28 @@ static void look_back(hapi_physics *physics, int64_t now_ns)
   }
 }
 
+#define LATE_S 1.0
+#define UNSOLVED_TICKS 50u
+
+/* What the application can mend and would not see: physics in slow motion, a force that is not
+ * what the bodies would give. */
+static void cycle_tell(hapi_physics *physics, double seconds)
+{
+  const hapi_cycle *cycle = &physics->cycle;
+  double late_s = seconds > cycle->probe_step_s ? physics->late_s + seconds : 0.0;
+  physics->late_s = physics->config.lockstep ? 0.0 : late_s;
+  if (physics->late_s > LATE_S) {
+    hapi_say_once(cycle, &physics->said_late,
+                  "physics takes longer than its period: the world is beyond real time; fewer "
+                  "bodies, iterations or a lower physics_hz would help");
+  }
+  if (cycle->state != NULL && cycle->state->unsolved >= UNSOLVED_TICKS) {
+    hapi_say_once(cycle, &physics->said_unsolved,
+                  "more bodies touch than a tick can solve: the force is approximate "
+                  "(hap_stats.contact.residual_max)");
+  }
+}
+
 static void note_times(hapi_physics *physics, const double seconds[5], double looked_s)
 {
   hapi_physics_counts *f = &physics->counts.own;
@@ -227,6 +249,7 @@ static void note_times(hapi_physics *physics, const double seconds[5], double lo
   s->physics.last.publish_ms = 1e3 * seconds[4];
   hapi_histogram_add(&physics->counts.cycle_ns, (int64_t)(1e9 * total));
   hapi_dial_note(&physics->dial, total, looked_s);
+  cycle_tell(physics, total);
   hapi_counts_show(physics);
 }
 

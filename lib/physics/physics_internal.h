@@ -59,6 +59,9 @@ struct hapi_physics {
   hapi_world_lock lock;
   hapi_pace pace;
   bool world_faulty; /* holds a state that ODE would abort on: not stepped */
+  double late_s;     /* of cycles that took longer than their period, one after the other */
+  bool said_late;
+  bool said_unsolved;
 };
 
 /* cycle.c: the collision phase, and testing simulations */

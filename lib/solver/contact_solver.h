@@ -53,6 +53,9 @@ typedef struct hapi_solver {
   double residual;        /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
 } hapi_solver;
 
+/* m/s: what is left undone and may add energy; below, asking costs too much */
+#define HAPI_UNSOLVED 3e-3
+
 /* Doubles of work for stacks, chains and flat piles: 16 blocks of 6x6 for each body. A dense island
  * of n bodies takes n. */
 #define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*6 + (size_t)(bodies)*600)

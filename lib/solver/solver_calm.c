@@ -16,8 +16,6 @@
 #include "base/vec.h"
 #include "solver/island.h"
 
-#define UNSOLVED \
-  3e-3 /* m/s: what is left undone and may add energy; below, asking costs too much */
 #define ROUNDING 1e-9 /* of the sum of all terms' sizes */
 
 typedef struct ray {
@@ -137,7 +135,7 @@ static void impulses_shorten(hapi_solver *solver, const rays *r)
 void hapi_solver_calm(hapi_solver *solver)
 {
   rays r;
-  if (solver->row_count == 0 || solver->residual < UNSOLVED) {
+  if (solver->row_count == 0 || solver->residual < HAPI_UNSOLVED) {
     return;
   }
   find_islands(solver, &r);

@@ -347,6 +347,13 @@ static __attribute__((noinline, cold)) void share_out(const hapi_rows *rows, uin
   }
 }
 
+/* Of a tick, after its last solve. */
+static void rows_note_unsolved(hapi_rows *rows)
+{
+  rows->unsolved = rows->solver.residual < HAPI_UNSOLVED ? 0 : rows->unsolved + 1;
+  rows->unsolved_most = rows->unsolved > rows->unsolved_most ? rows->unsolved : rows->unsolved_most;
+}
+
 static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
 {
   hapi_solver *solver = &rows->solver;
@@ -476,6 +483,7 @@ void hapi_contact_step(hapi_tick *tick)
     rows_solve(&tick->rows, &tick->sample);
     bodies_take_velocities(&tick->bodies, &tick->rows, tick->facts.wishes);
   }
+  rows_note_unsolved(&tick->rows);
   hapi_pointer_forces(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->rows,
                       &tick->sample);
   if (pointers->proxies) {

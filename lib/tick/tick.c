@@ -83,6 +83,7 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->joints.count = tick->joints.told = 0;
   tick->rows.residual_max = 0.0;
   tick->rows.sweeps = 0;
+  tick->rows.unsolved = tick->rows.unsolved_most = 0;
   solver->row_count = solver->body_count = 0;
   solver->dear_rows = solver->dear_runs = solver->vain_runs = 0;
   solver->ready = true; /* as the rows are made */
