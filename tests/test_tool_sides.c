@@ -361,3 +361,35 @@ TEST(both_sides_of_an_inner_corner_push)
   }
   tool_end(&w);
 }
+
+/* ---- heightfields ---- */
+
+#define CELLS 40
+
+/* Fine cells, pressed deep, and along: the triangles that are near stay few. */
+TEST(a_level_heightfield_holds)
+{
+  static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT};
+  static double heights[(CELLS + 1) * (CELLS + 1)];
+  for (int m = 0; m < 2; ++m) {
+    tool_world w;
+    dMatrix3 upright;
+    world_begin(&w, models[m], 60.0);
+    dHeightfieldDataID data = dGeomHeightfieldDataCreate();
+    dGeomHeightfieldDataBuildDouble(data, heights, 0, 0.2, 0.2, CELLS + 1, CELLS + 1, 1.0, 0.0,
+                                    0.05, 0);
+    dGeomHeightfieldDataSetBounds(data, -0.1, 0.1);
+    dGeomID field = dCreateHeightfield(w.space, data, 1);
+    dRFromAxisAndAngle(upright, 1.0, 0.0, 0.0, 0.5 * 3.14159265358979323846);
+    dGeomSetRotation(field, upright);
+    tool_go(&w, 0.0013, 0.0027, 0.02, 0.0);
+    tool_start(&w);
+    tool_move(&w, 0.0013, 0.0027, HALF - 0.02, 0.0, 350);
+    CHECK_NEAR(w.state.wrench.force[2], 20.0, 1e-6);
+    w.steepest = 0.0;
+    tool_move(&w, 0.01, 0.0027, HALF - 0.02, 0.0, 100);
+    CHECK(w.steepest < 1e-6);
+    tool_end(&w);
+    dGeomHeightfieldDataDestroy(data);
+  }
+}

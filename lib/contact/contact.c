@@ -339,6 +339,28 @@ static hapi_touch_side tool_side_at(const placed_tool *tool, const hap_pose *pos
                            .shape_pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
 }
 
+/* m: a shape of that extent is not nearer to the geom than this. */
+static double least_distance(const placed_geom *geom, const hapi_touch_side *from, double extent)
+{
+  const hapi_shape *s = &geom->shape;
+  double middle[3] = {0.0, 0.0, 0.0}; /* in the geom's frame */
+  double reach = hapi_v3_norm(s->half) + s->radius;
+  if (s->kind == HAPI_SHAPE_PLANE) {
+    return -HUGE_VAL;
+  }
+  if (s->kind == HAPI_SHAPE_HULL) {
+    double side[3];
+    hapi_v3_copy(s->hull, middle);
+    for (size_t i = 1; i < s->hull_count; ++i) {
+      hapi_v3_sub(s->hull + 3 * i, s->hull, side);
+      reach = fmax(reach, hapi_v3_norm(side));
+    }
+  }
+  hapi_pose_point(geom->pose.position, geom->pose.quat_wxyz, middle, middle);
+  hapi_v3_sub(middle, from->pose.position, middle);
+  return hapi_v3_norm(middle) - extent - reach;
+}
+
 /* The points where the hull would touch if it were there, away from where it is. */
 static void tool_pair_add(const hapi_contact *contact, const placed_tool *tool,
                           const hapi_near_tool_pair *pair, const double away[3], tool_group *io)
@@ -353,8 +375,12 @@ static void tool_pair_add(const hapi_contact *contact, const placed_tool *tool,
   const mover self = {&tool->twist, tool->in->extent};
   const hapi_touch_side a = tool_side_at(tool, &pose);
   const hapi_touch_side b = geom_side(&geom);
-  if (!hapi_tool_patch(&a, &b, margin_between(contact, self, geom_mover(&geom)), tool->in->extent,
-                       &patch)) {
+  double margin = margin_between(contact, self, geom_mover(&geom));
+  if (least_distance(&geom, &a, tool->in->extent) > margin) {
+    ++io->pairs;
+    return;
+  }
+  if (!hapi_tool_patch(&a, &b, margin, tool->in->extent, &patch)) {
     return;
   }
   for (int i = 0; i < patch.count && io->spots.count < HAPI_TOOL_SPOTS; ++i) {
@@ -401,28 +427,6 @@ static void tool_geom_find(const hapi_contact *contact, const tool_geom *g, cons
   for (uint32_t i = 0; i < g->count; ++i) {
     tool_pair_add(contact, &g->tool, &g->pairs[i], away, out);
   }
-}
-
-/* m: a shape of that extent is not nearer to the geom than this. */
-static double least_distance(const placed_geom *geom, const hapi_touch_side *from, double extent)
-{
-  const hapi_shape *s = &geom->shape;
-  double middle[3] = {0.0, 0.0, 0.0}; /* in the geom's frame */
-  double reach = hapi_v3_norm(s->half) + s->radius;
-  if (s->kind == HAPI_SHAPE_PLANE) {
-    return -HUGE_VAL;
-  }
-  if (s->kind == HAPI_SHAPE_HULL) {
-    double side[3];
-    hapi_v3_copy(s->hull, middle);
-    for (size_t i = 1; i < s->hull_count; ++i) {
-      hapi_v3_sub(s->hull + 3 * i, s->hull, side);
-      reach = fmax(reach, hapi_v3_norm(side));
-    }
-  }
-  hapi_pose_point(geom->pose.position, geom->pose.quat_wxyz, middle, middle);
-  hapi_v3_sub(middle, from->pose.position, middle);
-  return hapi_v3_norm(middle) - extent - reach;
 }
 
 /* From a shape of that extent; false: it is not nearer than *io_distance. */

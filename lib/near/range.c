@@ -275,17 +275,16 @@ static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
 {
   const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer];
   dBodyID body = dGeomGetBody(hit->geom);
-  double box[6];
-  double far = pointer->extent +
-               hapi_neighbors_reach(hapi_v3_norm(pointer->twist.linear) +
-                                        pointer->extent * hapi_v3_norm(pointer->twist.angular),
-                                    2.0 * nearby->cycle->probe_step_s) +
-               hapi_tool_depth(nearby, hit->pointer);
-  for (int k = 0; k < 6; ++k) {
-    box[k] = pointer->pose.position[k / 2] + (k % 2 == 0 ? -far : far);
-  }
-  uint32_t count = hapi_triangles_near(nearby, hit->geom, box, nearby->range.number);
-  for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
+  double speed =
+      hapi_v3_norm(pointer->twist.linear) + pointer->extent * hapi_v3_norm(pointer->twist.angular);
+  const hapi_tool_box box = {
+      .geom = hit->geom,
+      .at = pointer->pose.position,
+      .extent = pointer->extent,
+      .reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s),
+      .side = hapi_tool_told(nearby, hit->geom, hit->pointer)};
+  uint32_t count = hapi_tool_triangles(nearby, &box, nearby->range.number);
+  for (uint32_t i = 0; i < count; ++i) {
     uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i]);
     if (geom != HAPI_NONE && body != NULL) {
       /* The corners of a mesh that a body carries, in the body's frame. */

@@ -98,6 +98,19 @@ static void add_shape(tool_search *s, const hapi_touch_side *tool, hapi_touch_si
   ++s->patches;
 }
 
+/* m: the hull at that pose is not nearer to the triangle than this. */
+static double least_distance(const tool_search *s, const hap_pose *hull,
+                             const hapi_near_triangle *triangle)
+{
+  double apart[3];
+  double sides[2][3];
+  hapi_v3_sub(triangle->corners, hull->position, apart);
+  hapi_v3_sub(triangle->corners + 3, triangle->corners, sides[0]);
+  hapi_v3_sub(triangle->corners + 6, triangle->corners, sides[1]);
+  double reach = fmax(hapi_v3_norm(sides[0]), hapi_v3_norm(sides[1]));
+  return hapi_v3_norm(apart) - reach - s->at->pointer->extent;
+}
+
 /* The points where the hull would touch if it were there, away from where it is. */
 static void search_look(tool_search *s, const double away[3])
 {
@@ -111,7 +124,11 @@ static void search_look(tool_search *s, const double away[3])
   for (uint32_t i = 0; i < s->triangles; ++i) {
     const hapi_near_triangle *triangle = &s->nearby->meshes.found[i];
     hapi_touch_side other = triangle_side(triangle);
-    add_shape(s, &tool, &other, triangle);
+    if (least_distance(s, &pose, triangle) > s->margin) {
+      ++s->patches;
+    } else {
+      add_shape(s, &tool, &other, triangle);
+    }
   }
 }
 
@@ -130,7 +147,8 @@ static bool search_distance(void *of, const hap_pose *hull, double *out_distance
   }
   for (uint32_t i = 0; i < s->triangles; ++i) {
     const hapi_touch_side b = triangle_side(&s->nearby->meshes.found[i]);
-    if (hapi_patch_distance(&a.shape, &a.pose, &b.shape, &b.pose, &distance, normal) &&
+    if (least_distance(s, hull, &s->nearby->meshes.found[i]) < *out_distance &&
+        hapi_patch_distance(&a.shape, &a.pose, &b.shape, &b.pose, &distance, normal) &&
         distance < *out_distance) {
       *out_distance = distance;
       hapi_v3_copy(normal, out_normal);
@@ -166,22 +184,33 @@ static void search_keep_side(tool_search *s)
   }
 }
 
-/* The triangles that the hull may touch, also on its way back to where it touched. */
-static void search_mesh(tool_search *s)
+#define SHORTER_TIMES 4 /* halvings of a reach */
+
+uint32_t hapi_tool_triangles(hapi_nearby *nearby, const hapi_tool_box *in, uint64_t walk)
 {
-  double box[6];
-  double far = s->at->pointer->extent + s->margin;
-  if (s->at->side != NULL) {
-    far += hapi_v3_norm(s->at->side->way);
+  double way[3] = {0.0, 0.0, 0.0};
+  double reach = in->reach;
+  dBodyID body = dGeomGetBody(in->geom);
+  if (in->side != NULL) {
+    hapi_v3_copy(in->side->way, way);
   }
-  for (int k = 0; k < 3; ++k) {
-    box[2 * k] = s->pose.position[k] - far;
-    box[2 * k + 1] = s->pose.position[k] + far;
+  if (in->side != NULL && body != NULL) {
+    hapi_quat_rotate(dBodyGetQuaternion(body), in->side->way, way);
   }
-  uint32_t count =
-      hapi_triangles_near(s->nearby, s->at->geom, box, s->nearby->cycle->model_number + 1);
-  s->nearby->counts.dropped += count == HAPI_NEAR_TRIANGLES;
-  s->triangles = count < HAPI_NEAR_TRIANGLES ? count : 0;
+  for (int i = 0; i <= SHORTER_TIMES; ++i) {
+    double box[6];
+    for (int k = 0; k < 3; ++k) {
+      box[2 * k] = in->at[k] + fmin(way[k], 0.0) - in->extent - reach;
+      box[2 * k + 1] = in->at[k] + fmax(way[k], 0.0) + in->extent + reach;
+    }
+    uint32_t count = hapi_triangles_near(nearby, in->geom, box, walk);
+    if (count < HAPI_NEAR_TRIANGLES) {
+      return count;
+    }
+    ++nearby->counts.dropped;
+    reach *= 0.5;
+  }
+  return 0;
 }
 
 static void search_reduce(tool_search *s)
@@ -236,7 +265,8 @@ static void search_begin(tool_search *s, hapi_nearby *nearby, const hapi_tool_at
   s->margin = fmin(at->reach, hapi_neighbors_reach(speed, at->horizon));
   int kind = dGeomGetClass(at->geom);
   if (hapi_geom_has_triangles(at->geom)) {
-    search_mesh(s);
+    const hapi_tool_box box = {at->geom, pose->position, pointer->extent, s->margin, at->side};
+    s->triangles = hapi_tool_triangles(nearby, &box, nearby->cycle->model_number + 1);
   } else if (kind == dConvexClass) {
     s->has_shape = hapi_hull_of_convex(nearby, at->geom, &s->other.shape, &s->other.pose);
   } else {
@@ -287,14 +317,12 @@ static void fill_hit(const tool_search *s, hapi_hit *out)
   out->tool_pose = s->pose;
 }
 
-/* What the loop last told of hull and geom; NULL: nothing that is of use. */
-static const hapi_tool_side *told_side(hapi_nearby *nearby, const hapi_candidate *candidate,
-                                       uint64_t key)
+const hapi_tool_side *hapi_tool_told(hapi_nearby *nearby, dGeomID geom, uint32_t pointer)
 {
   const hapi_tool_side *side =
       hapi_tool_side_find(hapi_state_sides(nearby->cycle->state), nearby->cycle->state->side_count,
-                          key, candidate->pointer);
-  dBodyID body = dGeomGetBody(candidate->geom);
+                          hapi_tool_geom_key(nearby, geom, pointer), pointer);
+  dBodyID body = dGeomGetBody(geom);
   if (side == NULL || body == NULL) {
     return side;
   }
@@ -321,13 +349,12 @@ bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_h
   tool_search s;
   const hapi_state_pointer *pointer =
       &hapi_state_pointers(nearby->cycle->state)[candidate->pointer];
-  uint64_t key = hapi_tool_geom_key(nearby, candidate->geom, candidate->pointer);
   const hapi_tool_at at = {.geom = candidate->geom,
                            .index = candidate->pointer,
                            .pointer = pointer,
                            .hull = &hapi_state_hulls(nearby->cycle->state)[candidate->pointer],
-                           .key = key,
-                           .side = told_side(nearby, candidate, key),
+                           .key = hapi_tool_geom_key(nearby, candidate->geom, candidate->pointer),
+                           .side = hapi_tool_told(nearby, candidate->geom, candidate->pointer),
                            .reach = candidate->reach,
                            .horizon = nearby->cycle->probe_step_s};
   hap_pose pose = pointer->pose;

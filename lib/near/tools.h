@@ -69,6 +69,21 @@ bool hapi_tool_look(hapi_nearby *nearby, const hapi_tool_at *at, uint32_t found)
 void hapi_tool_join(hapi_nearby *nearby, uint32_t count);
 /* The same of the first hits of the model. */
 void hapi_tool_join_hits(hapi_nearby *nearby, uint32_t count);
+/* What a hull at a place [m] may meet: within the reach, and on its way back to where it touched. */
+typedef struct hapi_tool_box {
+  dGeomID geom;
+  const double *at;
+  double extent; /* m */
+  double reach;  /* m */
+  const hapi_tool_side *side;
+} hapi_tool_box;
+
+/* What the loop last told of hull and geom; NULL: nothing that is of use. */
+const hapi_tool_side *hapi_tool_told(hapi_nearby *nearby, dGeomID geom, uint32_t pointer);
+/* Triangles of the geom in the box, as hapi_triangles_near; of more than there is room for, those
+ * within a shorter reach, which is counted. */
+uint32_t hapi_tool_triangles(hapi_nearby *nearby, const hapi_tool_box *box, uint64_t walk);
+
 uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer);
 void hapi_tool_keep_places(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body);
 void hapi_tool_take(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body);
