@@ -11,7 +11,7 @@
 
 #include "base/clock.h"
 #include "tests/contact_world.h"
-#include "tools/rig.h"
+#include "tests/owned_rig.h"
 
 #define G CW_GRAVITY
 
@@ -764,8 +764,6 @@ TEST(a_model_of_any_age_will_do)
 
 static void run_threads(double contact_hz, double seconds)
 {
-  hap_detail detail = {""};
-  rig r;
   rig_options options;
   rig_options_init(&options);
   options.scene = "row10";
@@ -773,12 +771,12 @@ static void run_threads(double contact_hz, double seconds)
   options.def.rt_priority = 0;
   options.def.physics_hz = 20.0;
   options.expert.contact_hz = contact_hz;
-  REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
-  CHECK(hap_session_start(r.session) >= HAP_OK);
+  rig *r = rig_own(&options);
+  CHECK(hap_session_start(r->session) >= HAP_OK);
   hapi_clock_sleep_until(hapi_clock_now() + (int64_t)(1e9 * seconds));
-  CHECK(hap_session_stop(r.session) == HAP_OK);
+  CHECK(hap_session_stop(r->session) == HAP_OK);
   hap_stats stats;
-  CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
+  CHECK(hap_session_stats(r->session, &stats, sizeof stats) == HAP_OK);
   printf(
       "# %g Hz: %llu ticks, %llu passes, %llu contact ticks, residual %.2g, momentum %.4f, peak "
       "%.2f N, model age max %.4f\n",
@@ -792,7 +790,6 @@ static void run_threads(double contact_hz, double seconds)
   CHECK(stats.contact.residual_max < 1e-2);
   CHECK(stats.hand.peak_force_n < 100.0);
   CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 0.02);
-  rig_destroy(&r);
 }
 
 TEST(two_seconds_of_threads_and_a_late_contact_thread)

@@ -10,7 +10,7 @@
 #include <hapode/ode.h>
 
 #include "tests/contact_world.h"
-#include "tools/rig.h"
+#include "tests/owned_rig.h"
 
 #define G CW_GRAVITY
 
@@ -97,8 +97,6 @@ TEST(fig5_has_the_closed_forms_peak_and_impulse)
   static const double rates[] = {20.0, 60.0};
   for (int i = 0; i < 6; ++i) {
     static hap_trace_row rows[1200];
-    hap_detail detail = {""};
-    rig r;
     rig_options options;
     rig_options_init(&options);
     scene_parameters parameters = *scene_table_at(0);
@@ -110,22 +108,22 @@ TEST(fig5_has_the_closed_forms_peak_and_impulse)
     options.def.physics_hz = rates[i / 3];
     options.def.drive = HAP_DRIVE_LOCKSTEP;
     options.expert.trace_rows = 1200;
-    REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
-    CHECK(hap_session_start(r.session) == HAP_OK && hap_session_advance(r.session, 1200) == HAP_OK);
+    rig *r = rig_own(&options);
+    CHECK(hap_session_start(r->session) == HAP_OK &&
+          hap_session_advance(r->session, 1200) == HAP_OK);
     size_t count = 0;
     double peak = 0.0;
     double impulse = 0.0;
-    CHECK(hap_session_trace_read(r.session, rows, 1200, sizeof(hap_trace_row), &count) == HAP_OK);
+    CHECK(hap_session_trace_read(r->session, rows, 1200, sizeof(hap_trace_row), &count) == HAP_OK);
     for (size_t j = 0; j < count; ++j) {
       peak = fmax(peak, cw_norm(rows[j].pointers[0].force));
       impulse += 1e-3 * cw_norm(rows[j].pointers[0].force);
     }
     hap_stats stats;
-    CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
+    CHECK(hap_session_stats(r->session, &stats, sizeof stats) == HAP_OK);
     CHECK_NEAR(peak / (0.017 * sqrt(k * parameters.mass)), 1.0, 1e-3);
     CHECK_NEAR(impulse / (2.0 * parameters.mass * 0.017), 1.0, 1e-3);
     CHECK_NEAR(stats.hand.momentum_ratio, 1.0, 5e-3);
-    rig_destroy(&r);
   }
 }
 
@@ -171,7 +169,6 @@ TEST(a_hand_that_rests_on_a_stack_feels_what_dworldstep_gives)
 {
   static hap_trace_row rows[2000];
   hap_detail detail = {""};
-  rig r;
   rig_options options;
   exact_world exact = {NULL, dJointGroupCreate(0)};
   rig_options_init(&options);
@@ -180,10 +177,10 @@ TEST(a_hand_that_rests_on_a_stack_feels_what_dworldstep_gives)
   options.def.physics_hz = 20.0;
   options.def.drive = HAP_DRIVE_LOCKSTEP;
   options.expert.trace_rows = 2000;
-  REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
-  CHECK(hap_session_start(r.session) == HAP_OK && hap_session_advance(r.session, 2000) == HAP_OK);
+  rig *r = rig_own(&options);
+  CHECK(hap_session_start(r->session) == HAP_OK && hap_session_advance(r->session, 2000) == HAP_OK);
   size_t count = 0;
-  CHECK(hap_session_trace_read(r.session, rows, 2000, sizeof(hap_trace_row), &count) == HAP_OK &&
+  CHECK(hap_session_trace_read(r->session, rows, 2000, sizeof(hap_trace_row), &count) == HAP_OK &&
         count == 2000);
   REQUIRE(scene_create("hold", &exact.scene, &detail) == HAP_OK);
   double worst = 0.0;
@@ -198,7 +195,7 @@ TEST(a_hand_that_rests_on_a_stack_feels_what_dworldstep_gives)
   printf("# worst %.3g\n", worst);
   CHECK(rows[1999].pointers[0].force[2] > 3.0);
   CHECK(worst <= 0.02);
-  rig_destroy(&r);
+  tap_release(r);
   scene_destroy(exact.scene);
   dJointGroupDestroy(exact.group);
 }

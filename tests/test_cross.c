@@ -9,7 +9,7 @@
 #include <tests/physics_world.h>
 
 #include "haptic/haptic_internal.h"
-#include "tools/rig.h"
+#include "tests/owned_rig.h"
 
 #define EDGE 0.05     /* m */
 #define APART 0.03    /* m, from a body's centre to the joint: no contact between them */
@@ -337,9 +337,7 @@ TEST(two_hands_on_a_pair_leave_no_residual)
 
 static uint64_t hash_of(const char *scene_name, hap_probe probe, hap_effect_wish cross)
 {
-  rig r;
   rig_options options;
-  hap_detail detail = {""};
   hap_stats stats;
   memset(&stats, 0, sizeof stats);
   rig_options_init(&options);
@@ -349,15 +347,12 @@ static uint64_t hash_of(const char *scene_name, hap_probe probe, hap_effect_wish
   options.def.model = HAP_MODEL_ACCELERANCE;
   options.research.probe = probe;
   expert_wish(&options.expert, HAP_EFFECT_CROSS, cross);
-  if (rig_create(&options, &r, &detail) < HAP_OK) {
-    CHECK(!"a scene");
-    return 0;
-  }
-  CHECK(hap_session_start(r.session) == HAP_OK);
-  CHECK(hap_session_advance(r.session, 700) == HAP_OK);
-  CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
+  rig *r = rig_own(&options);
+  CHECK(hap_session_start(r->session) == HAP_OK);
+  CHECK(hap_session_advance(r->session, 700) == HAP_OK);
+  CHECK(hap_session_stats(r->session, &stats, sizeof stats) == HAP_OK);
   CHECK(stats.loop.contact_ticks > 0);
-  rig_destroy(&r);
+  tap_release(r);
   return stats.loop.trace_hash;
 }
 

@@ -9,7 +9,7 @@
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 
-#include "tools/rig.h"
+#include "tests/owned_rig.h"
 
 #define MASS 0.3
 #define GRAVITY 9.81
@@ -68,9 +68,7 @@ static void read_row(const rig *r, hap_trace_row *out)
 static held hold_box(const hold *h, double seconds)
 {
   held out = {0};
-  hap_detail detail = {""};
   char hands[2][256];
-  rig r;
   rig_options options;
   hap_trace_row row;
   scene_parameters parameters = cube_grasp();
@@ -89,19 +87,16 @@ static held hold_box(const hold *h, double seconds)
   options.expert.trace_rows = 4;
   options.coupling = h->coupling;
   options.coupling_stiffness = h->coupling == HAP_COUPLING_PROXY ? 5000.0 : 0.0;
-  if (rig_create(&options, &r, &detail) < HAP_OK || hap_session_start(r.session) < HAP_OK) {
-    printf("# %s\n", detail.text);
-    CHECK(false);
-    return out;
-  }
+  rig *r = rig_own(&options);
+  REQUIRE(hap_session_start(r->session) >= HAP_OK);
   double before = 0.0;
   for (int i = 0; i < (int)(1000.0 * (2.0 + seconds)); ++i) {
-    CHECK(hap_session_advance(r.session, 1) == HAP_OK);
-    read_row(&r, &row);
+    CHECK(hap_session_advance(r->session, 1) == HAP_OK);
+    read_row(r, &row);
     out.last = row.body_position[0][2];
     if (i == 2000) {
       before = out.last;
-      out.turn = 2.0 * dBodyGetQuaternion(r.scene->bodies[0])[1];
+      out.turn = 2.0 * dBodyGetQuaternion(r->scene->bodies[0])[1];
     }
     for (int k = 0; k < 2; ++k) {
       const double *f = row.pointers[k].force;
@@ -109,8 +104,8 @@ static held hold_box(const hold *h, double seconds)
     }
   }
   out.lost = before - out.last;
-  out.turn = 2.0 * dBodyGetQuaternion(r.scene->bodies[0])[1] - out.turn;
-  rig_destroy(&r);
+  out.turn = 2.0 * dBodyGetQuaternion(r->scene->bodies[0])[1] - out.turn;
+  tap_release(r);
   return out;
 }
 
@@ -205,11 +200,9 @@ TEST(recorded_fingers_grip_a_box)
     snprintf(specs[k], sizeof specs[k], "replay:%s/data/%s," PLACE, folder, files[k]);
   }
   for (int m = 0; m < 2; ++m) {
-    hap_detail detail = {""};
     grips out = {0};
     hap_trace_row before = {0};
     hap_trace_row row;
-    rig r;
     rig_options options;
     scene_parameters parameters = cube_grasp();
     parameters.size = 0.036;
@@ -221,11 +214,11 @@ TEST(recorded_fingers_grip_a_box)
     options.def.drive = HAP_DRIVE_LOCKSTEP;
     options.def.model = models[m];
     options.expert.trace_rows = 4;
-    REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
-    REQUIRE(hap_session_start(r.session) == HAP_OK);
+    rig *r = rig_own(&options);
+    REQUIRE(hap_session_start(r->session) == HAP_OK);
     for (int i = 0; i < 50000; ++i) {
-      CHECK(hap_session_advance(r.session, 1) == HAP_OK);
-      read_row(&r, &row);
+      CHECK(hap_session_advance(r->session, 1) == HAP_OK);
+      read_row(r, &row);
       note_fingers(&row, &before, &out);
     }
     printf("# %s: both touch in %d ticks, peak %.2f N, steepest %.2f N, box up to %.4f m\n",
@@ -234,8 +227,7 @@ TEST(recorded_fingers_grip_a_box)
     CHECK(out.steep < 2.0); /* 1 mm a tick */
     CHECK(out.peak > 5.0 && out.peak < 20.0);
     hap_stats stats;
-    CHECK(hap_session_stats(r.session, &stats, sizeof stats) == HAP_OK);
+    CHECK(hap_session_stats(r->session, &stats, sizeof stats) == HAP_OK);
     CHECK(stats.faults.count == 0 && stats.faults.states_rejected == 0);
-    rig_destroy(&r);
   }
 }

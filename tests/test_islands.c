@@ -8,7 +8,7 @@
 
 #include <dirent.h>
 
-#include "tools/rig.h"
+#include "tests/owned_rig.h"
 
 #define CUBES 40
 
@@ -23,11 +23,10 @@ static int thread_count(void)
   return count;
 }
 
-static bool open_rig(hap_drive drive, hap_model model, int threads, rig *out)
+static rig *open_rig(hap_drive drive, hap_model model, int threads)
 {
   static scene_parameters parameters = {.name = ""};
   rig_options options;
-  hap_detail detail = {""};
   rig_options_init(&options);
   for (size_t i = 0; strcmp(parameters.name, "fig7") != 0; ++i) {
     parameters = *scene_table_at(i);
@@ -40,38 +39,35 @@ static bool open_rig(hap_drive drive, hap_model model, int threads, rig *out)
   options.island_threads = threads;
   options.def.drive = drive;
   options.def.model = model;
-  hap_status status = rig_create(&options, out, &detail);
-  printf("%s%s", status < HAP_OK ? "# " : "", status < HAP_OK ? detail.text : "");
-  return status >= HAP_OK;
+  return rig_own(&options);
 }
 
 /* Frames of 10 ms, one second, in which each cube is pushed sideways and up by a force of its
  * own. */
 static void run_frames(int threads, double out[CUBES][3])
 {
-  rig r;
   int before = thread_count();
-  REQUIRE(open_rig(HAP_DRIVE_FRAME, HAP_MODEL_IMPULSE, threads, &r));
-  REQUIRE(hap_session_start(r.session) >= HAP_OK);
+  rig *r = open_rig(HAP_DRIVE_FRAME, HAP_MODEL_IMPULSE, threads);
+  REQUIRE(hap_session_start(r->session) >= HAP_OK);
   CHECK(thread_count() - before >= (threads > 1 ? threads : 0) + 1);
   int running = thread_count();
   for (int i = 0; i < 100; ++i) {
-    REQUIRE(hap_session_lock(r.session) >= HAP_OK);
+    REQUIRE(hap_session_lock(r->session) >= HAP_OK);
     for (int k = 0; k < CUBES; ++k) {
-      dBodyEnable(r.scene->bodies[k]);
-      dBodyAddForce(r.scene->bodies[k], 0.0, 0.05 * k, 0.0);
+      dBodyEnable(r->scene->bodies[k]);
+      dBodyAddForce(r->scene->bodies[k], 0.0, 0.05 * k, 0.0);
     }
-    hap_session_unlock(r.session);
-    CHECK(hap_session_update(r.session, 0.01) >= HAP_OK);
+    hap_session_unlock(r->session);
+    CHECK(hap_session_update(r->session, 0.01) >= HAP_OK);
   }
   CHECK(thread_count() == running);
-  hap_session_stop(r.session);
+  hap_session_stop(r->session);
   CHECK(thread_count() == before);
   for (int k = 0; k < CUBES; ++k) {
-    memcpy(out[k], dBodyGetPosition(r.scene->bodies[k]), 3 * sizeof(double));
+    memcpy(out[k], dBodyGetPosition(r->scene->bodies[k]), 3 * sizeof(double));
   }
-  dWorldQuickStep(r.scene->world, 0.001); /* by the caller's thread again */
-  rig_destroy(&r);
+  dWorldQuickStep(r->scene->world, 0.001); /* by the caller's thread again */
+  tap_release(r);
 }
 
 /* Each cube by itself is solved as before; only which of them comes first is not given. */
@@ -91,17 +87,14 @@ TEST(threads_step_the_same_world)
 
 static uint64_t hash_of(hap_model model, int threads)
 {
-  rig r;
   hap_stats stats = {0};
   int before = thread_count();
-  if (!open_rig(HAP_DRIVE_LOCKSTEP, model, threads, &r)) {
-    return 0;
-  }
-  CHECK(hap_session_start(r.session) >= HAP_OK);
+  rig *r = open_rig(HAP_DRIVE_LOCKSTEP, model, threads);
+  CHECK(hap_session_start(r->session) >= HAP_OK);
   CHECK(thread_count() == before);
-  CHECK(hap_session_advance(r.session, 400) >= HAP_OK);
-  CHECK(hap_session_stats(r.session, &stats, sizeof stats) >= HAP_OK);
-  rig_destroy(&r);
+  CHECK(hap_session_advance(r->session, 400) >= HAP_OK);
+  CHECK(hap_session_stats(r->session, &stats, sizeof stats) >= HAP_OK);
+  tap_release(r);
   return stats.loop.trace_hash;
 }
 
@@ -116,18 +109,17 @@ TEST(lockstep_has_none)
 TEST(testing_simulations_go_without)
 {
   for (int i = 0; i < 2; ++i) {
-    rig r;
     hap_stats stats = {0};
-    REQUIRE(open_rig(HAP_DRIVE_FRAME, HAP_MODEL_ACCELERANCE, 2, &r));
+    rig *r = open_rig(HAP_DRIVE_FRAME, HAP_MODEL_ACCELERANCE, 2);
     for (int again = 0; again < 2; ++again) {
-      REQUIRE(hap_session_start(r.session) >= HAP_OK);
+      REQUIRE(hap_session_start(r->session) >= HAP_OK);
       for (int frame = 0; frame < 30; ++frame) {
-        CHECK(hap_session_update(r.session, 0.02) >= HAP_OK);
+        CHECK(hap_session_update(r->session, 0.02) >= HAP_OK);
       }
-      CHECK(hap_session_stats(r.session, &stats, sizeof stats) >= HAP_OK);
+      CHECK(hap_session_stats(r->session, &stats, sizeof stats) >= HAP_OK);
       CHECK(stats.probes.steps > 0 && stats.faults.count == 0);
-      hap_session_stop(r.session);
+      hap_session_stop(r->session);
     }
-    rig_destroy(&r);
+    tap_release(r);
   }
 }

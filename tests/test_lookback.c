@@ -10,7 +10,7 @@
 
 #include "base/clock.h"
 #include "tests/contact_world.h"
-#include "tools/rig.h"
+#include "tests/owned_rig.h"
 
 #define TICKS 1500
 #define SPEED 0.1 /* m/s, of the hand */
@@ -188,37 +188,35 @@ static void rig_nudge(const rig *r)
 
 static void play_scene(const play_def *def, scene_course *out)
 {
-  rig r;
   rig_options options;
-  hap_detail detail = {""};
   hap_trace_row row;
   size_t count = 0;
   set_up(def, &options);
-  REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
+  rig *r = rig_own(&options);
   if (def->model == HAP_MODEL_SINGLE) {
-    dWorldSetQuickStepNumIterations(r.scene->world, SCENE_ITERATIONS);
+    dWorldSetQuickStepNumIterations(r->scene->world, SCENE_ITERATIONS);
   }
   if (def->iterations > 0) {
-    dWorldSetQuickStepNumIterations(r.scene->world, def->iterations);
+    dWorldSetQuickStepNumIterations(r->scene->world, def->iterations);
   }
-  REQUIRE(hap_session_start(r.session) == HAP_OK);
-  out->ticks = (size_t)fmin(1e3 * r.scene->parameters.duration, SCENE_TICKS);
+  REQUIRE(hap_session_start(r->session) == HAP_OK);
+  out->ticks = (size_t)fmin(1e3 * r->scene->parameters.duration, SCENE_TICKS);
   size_t every = (size_t)(1e3 / def->haptic_hz);
   for (size_t i = 0; i < out->ticks; ++i) {
     if (i % every == 0) {
-      CHECK(hap_session_advance(r.session, 1) == HAP_OK);
-      CHECK(hap_session_trace_read(r.session, &row, 1, sizeof(hap_trace_row), &count) == HAP_OK &&
+      CHECK(hap_session_advance(r->session, 1) == HAP_OK);
+      CHECK(hap_session_trace_read(r->session, &row, 1, sizeof(hap_trace_row), &count) == HAP_OK &&
             count == 1);
     }
     for (size_t p = 0; p < row.pointer_count && p < SCENE_POINTERS_MAX; ++p) {
       memcpy(&out->force[i][3 * p], row.pointers[p].force, 3 * sizeof(double));
     }
     if (def->interrupted && i % 600 == 599) {
-      rig_nudge(&r);
+      rig_nudge(r);
     }
   }
-  CHECK(hap_session_stats(r.session, &out->stats, sizeof out->stats) == HAP_OK);
-  rig_destroy(&r);
+  CHECK(hap_session_stats(r->session, &out->stats, sizeof out->stats) == HAP_OK);
+  tap_release(r);
 }
 
 static double scene_error(const scene_course *c, const scene_course *reference)

@@ -9,7 +9,7 @@
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 
-#include "tools/rig.h"
+#include "tests/owned_rig.h"
 
 #define CHUNK 500
 #define PI 3.14159265358979323846
@@ -95,26 +95,22 @@ static outcome run_seeded(rig_options *options, double seconds, unsigned long se
 {
   outcome out = {.finite = true};
   reader reading = {.out = &out, .half_time = 0.5 * seconds};
-  hap_detail detail = {""};
-  rig r;
   options->def.drive = HAP_DRIVE_LOCKSTEP;
   options->expert.trace_rows = CHUNK;
-  if (rig_create(options, &r, &detail) < HAP_OK || hap_session_start(r.session) < HAP_OK) {
-    printf("# %s\n", detail.text);
-    return out;
-  }
+  rig *r = rig_own(options);
+  REQUIRE(hap_session_start(r->session) >= HAP_OK);
   dRandSetSeed(seed); /* start has set it to 0 */
-  const scene_parameters *p = &r.scene->parameters;
+  const scene_parameters *p = &r->scene->parameters;
   reading.contact_x = p->radius + 0.5 * p->size;
   out.good = true;
   for (long ticks = lround(1e3 * seconds); ticks > 0; ticks -= CHUNK) {
     uint64_t now = (uint64_t)(ticks < CHUNK ? ticks : CHUNK);
-    out.good = out.good && hap_session_advance(r.session, now) == HAP_OK;
-    read_rows(&r, &reading);
+    out.good = out.good && hap_session_advance(r->session, now) == HAP_OK;
+    read_rows(r, &reading);
   }
   out.late_force_mean = reading.late_count > 0 ? reading.late_sum / (double)reading.late_count : 0;
-  out.good = out.good && hap_session_stats(r.session, &out.stats, sizeof out.stats) == HAP_OK;
-  rig_destroy(&r);
+  out.good = out.good && hap_session_stats(r->session, &out.stats, sizeof out.stats) == HAP_OK;
+  tap_release(r);
   return out;
 }
 

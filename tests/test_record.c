@@ -12,6 +12,7 @@
 #include <sys/resource.h>
 
 #include "tests/fake_device.h"
+#include "tests/owned_rig.h"
 #include "tests/recorded.h"
 
 /* ---- a device with a clock and troubles of its own ---- */
@@ -582,25 +583,23 @@ static void draw_frames(rig *r)
 TEST(a_frame_loop_with_pauses_and_hitches)
 {
   for (int model = HAP_MODEL_IMPULSE; model <= HAP_MODEL_CONTACT; ++model) {
-    rig r;
     rig_options options;
-    hap_detail detail = {""};
     recorded_setup s = recorded_setup_of("row10", (hap_model)model, 0);
     rig_options_init(&options);
     options.scene = s.scene;
     options.def.model = s.model;
     options.def.drive = HAP_DRIVE_FRAME;
     options.record = &s.record;
-    REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
-    hap_pointer_id id = add_hand(&r);
-    REQUIRE(hap_session_start(r.session) >= HAP_OK);
-    draw_frames(&r);
-    CHECK(hap_pointer_restart(r.session, id) == HAP_OK);
-    draw_frames(&r);
+    rig *r = rig_own(&options);
+    hap_pointer_id id = add_hand(r);
+    REQUIRE(hap_session_start(r->session) >= HAP_OK);
+    draw_frames(r);
+    CHECK(hap_pointer_restart(r->session, id) == HAP_OK);
+    draw_frames(r);
     hap_stats before;
-    CHECK(hap_session_stop(r.session) == HAP_OK);
-    CHECK(hap_session_stats(r.session, &before, sizeof before) == HAP_OK);
-    rig_destroy(&r);
+    CHECK(hap_session_stop(r->session) == HAP_OK);
+    CHECK(hap_session_stats(r->session, &before, sizeof before) == HAP_OK);
+    tap_release(r);
     hap_device_close(device);
     replay again = recorded_play("row10", 0);
     check_alike(&again, &before);
@@ -616,24 +615,22 @@ TEST(a_frame_loop_with_pauses_and_hitches)
 
 TEST(a_frame_loop)
 {
-  rig r;
   rig_options options;
-  hap_detail detail = {""};
   recorded_setup s = recorded_setup_of("stack", HAP_MODEL_CONTACT, 0);
   rig_options_init(&options);
   options.scene = s.scene;
   options.def.drive = HAP_DRIVE_FRAME;
   options.record = &s.record;
-  REQUIRE(rig_create(&options, &r, &detail) == HAP_OK);
-  REQUIRE(hap_session_start(r.session) >= HAP_OK);
+  rig *r = rig_own(&options);
+  REQUIRE(hap_session_start(r->session) >= HAP_OK);
   for (int frame = 0; frame < 60; ++frame) {
     sleep_ms(10 + frame % 7);
-    (void)hap_session_update(r.session, frame % 5 == 0 ? 0.05 : 0.011);
+    (void)hap_session_update(r->session, frame % 5 == 0 ? 0.05 : 0.011);
   }
   hap_stats before;
-  CHECK(hap_session_stop(r.session) == HAP_OK);
-  CHECK(hap_session_stats(r.session, &before, sizeof before) == HAP_OK);
-  rig_destroy(&r);
+  CHECK(hap_session_stop(r->session) == HAP_OK);
+  CHECK(hap_session_stats(r->session, &before, sizeof before) == HAP_OK);
+  tap_release(r);
   replay again = recorded_play("stack", 0);
   check_alike(&again, &before);
   CHECK(before.physics.steps > 10);

@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include "tests/owned_rig.h"
 #include "tests/recorded.h"
 
 static void turn_the_dial(rig *r, int look)
@@ -27,7 +28,6 @@ TEST(a_dial_that_is_turned)
     s.accuracy = 0.3;
     s.meanwhile = turn_the_dial;
     hap_stats before = recorded_make(&s);
-    rig r;
     rig_options options;
     hap_accuracy_info info;
     replay again = recorded_play("row10", 0);
@@ -35,17 +35,17 @@ TEST(a_dial_that_is_turned)
     rig_options_init(&options);
     options.scene = "row10";
     REQUIRE(hap_player_open(recorded_path, 0, &options.player, NULL) == HAP_OK);
-    REQUIRE(rig_create(&options, &r, NULL) == HAP_OK);
-    CHECK(hap_session_set_accuracy(r.session, 0.5) == HAP_ERROR_STATE);
-    CHECK(hap_session_set_budget(r.session, 0.0, 0.0) == HAP_ERROR_STATE);
-    CHECK(hap_session_start(r.session) == HAP_OK);
-    CHECK(hap_session_advance(r.session, 100) == HAP_OK);
-    CHECK(hap_session_accuracy(r.session, &info, sizeof info) == HAP_OK);
+    rig *r = rig_own(&options);
+    CHECK(hap_session_set_accuracy(r->session, 0.5) == HAP_ERROR_STATE);
+    CHECK(hap_session_set_budget(r->session, 0.0, 0.0) == HAP_ERROR_STATE);
+    CHECK(hap_session_start(r->session) == HAP_OK);
+    CHECK(hap_session_advance(r->session, 100) == HAP_OK);
+    CHECK(hap_session_accuracy(r->session, &info, sizeof info) == HAP_OK);
     CHECK_NEAR(info.tick.accuracy, 0.3, 1e-9);
-    CHECK(hap_session_advance(r.session, 200) == HAP_OK);
-    CHECK(hap_session_accuracy(r.session, &info, sizeof info) == HAP_OK);
+    CHECK(hap_session_advance(r->session, 200) == HAP_OK);
+    CHECK(hap_session_accuracy(r->session, &info, sizeof info) == HAP_OK);
     CHECK_NEAR(info.tick.accuracy, 0.9, 1e-9);
-    rig_destroy(&r);
+    tap_release(r);
     hap_player_close(options.player);
   }
 }

@@ -7,9 +7,9 @@
 #include "tests/tap.h"
 
 #include "base/vec.h"
+#include "tests/owned_rig.h"
 #include "tests/tool_world.h"
 #include "tests/unknown_shape.h"
-#include "tools/rig.h"
 
 #define HALF 0.01 /* m, of the tool */
 #define EDGE 0.06 /* m, of the body */
@@ -266,10 +266,8 @@ static scene_parameters parameters_of(const char *name)
   return *scene_table_at(i);
 }
 
-static bool open_scene(const scene_parameters *parameters, hap_model model, double physics_hz,
-                       rig *out)
+static rig *open_scene(const scene_parameters *parameters, hap_model model, double physics_hz)
 {
-  hap_detail detail = {""};
   rig_options options;
   rig_options_init(&options);
   options.parameters = parameters;
@@ -279,11 +277,9 @@ static bool open_scene(const scene_parameters *parameters, hap_model model, doub
   options.research.guard = HAP_GUARD_MEASURE;
   options.expert.trace_rows = 4;
   options.coupling = HAP_COUPLING_DIRECT;
-  if (rig_create(&options, out, &detail) < HAP_OK || hap_session_start(out->session) < HAP_OK) {
-    printf("# %s\n", detail.text);
-    return false;
-  }
-  return true;
+  rig *r = rig_own(&options);
+  REQUIRE(hap_session_start(r->session) >= HAP_OK);
+  return r;
 }
 
 static void next_row(const rig *r, hap_trace_row *out)
@@ -301,22 +297,18 @@ typedef struct felt {
   double torque[SCENE_TICKS][3];
 } felt;
 
-static bool feel_scene(const scene_parameters *parameters, hap_model model, double hz, felt *out)
+static void feel_scene(const scene_parameters *parameters, hap_model model, double hz, felt *out)
 {
-  rig r;
   hap_trace_row row;
   scene_parameters own = *parameters;
   own.iterations = model == HAP_MODEL_SINGLE ? 1000 : own.iterations;
-  if (!open_scene(&own, model, hz, &r)) {
-    return false;
-  }
+  rig *r = open_scene(&own, model, hz);
   for (int i = 0; i < SCENE_TICKS; ++i) {
-    next_row(&r, &row);
+    next_row(r, &row);
     hapi_v3_copy(row.pointers[0].force, out->force[i]);
     hapi_v3_copy(row.pointers[0].torque, out->torque[i]);
   }
-  rig_destroy(&r);
-  return true;
+  tap_release(r);
 }
 
 TEST(lever_and_peg_with_friction_feel_as_the_reference)
@@ -327,11 +319,11 @@ TEST(lever_and_peg_with_friction_feel_as_the_reference)
   static felt test;
   for (int i = 0; i < 2; ++i) {
     scene_parameters parameters = parameters_of(names[i]);
-    REQUIRE(feel_scene(&parameters, HAP_MODEL_CONTACT, 60.0, &bare));
+    feel_scene(&parameters, HAP_MODEL_CONTACT, 60.0, &bare);
     parameters.friction = 0.5;
     parameters.finger_radius = i == 0 ? 0.0 : 0.003;
-    REQUIRE(feel_scene(&parameters, HAP_MODEL_SINGLE, 60.0, &reference));
-    REQUIRE(feel_scene(&parameters, HAP_MODEL_CONTACT, 60.0, &test));
+    feel_scene(&parameters, HAP_MODEL_SINGLE, 60.0, &reference);
+    feel_scene(&parameters, HAP_MODEL_CONTACT, 60.0, &test);
     double force = error_of(test.force, reference.force, SCENE_TICKS);
     double torque = error_of(test.torque, reference.torque, SCENE_TICKS);
     double without = error_of(bare.force, reference.force, SCENE_TICKS);
@@ -366,7 +358,6 @@ static held hold_box(const hold *h, double seconds)
   scene_parameters p = parameters_of("grasp");
   char hands[2][256];
   double depth = h->grip * p.mass * p.gravity / (2.0 * 0.5) / p.stiffness;
-  rig r;
   hap_trace_row row = {0};
   p.friction = 0.5;
   p.finger_radius = 0.0;
@@ -382,21 +373,18 @@ static held hold_box(const hold *h, double seconds)
              h->device, open, h->beside, close, h->beside, close, h->beside);
     p.hands[i] = hands[i];
   }
-  if (!open_scene(&p, h->model, h->physics_hz, &r)) {
-    CHECK(false);
-    return out;
-  }
+  rig *r = open_scene(&p, h->model, h->physics_hz);
   for (int i = 0; i < (int)(1000.0 * (2.0 + seconds)); ++i) {
-    next_row(&r, &row);
+    next_row(r, &row);
     if (i == 2000) {
       out.lost = row.body_position[0][2];
-      out.turned = 2.0 * dBodyGetQuaternion(r.scene->bodies[0])[1];
+      out.turned = 2.0 * dBodyGetQuaternion(r->scene->bodies[0])[1];
     }
   }
   out.last = row.body_position[0][2];
   out.lost -= out.last;
-  out.turned = 2.0 * dBodyGetQuaternion(r.scene->bodies[0])[1] - out.turned;
-  rig_destroy(&r);
+  out.turned = 2.0 * dBodyGetQuaternion(r->scene->bodies[0])[1] - out.turned;
+  tap_release(r);
   return out;
 }
 
