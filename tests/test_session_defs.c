@@ -162,6 +162,8 @@ static const struct {
     REAL_FIELD(expert, reuse, (double)NAN),
     WHOLE_FIELD(research, guard, 2),
     WHOLE_FIELD(research, guard, -1),
+    WHOLE_FIELD(expert, substeps, 0),
+    WHOLE_FIELD(expert, substeps, 65),
     WHOLE_FIELD(expert, effects_on, 1 << HAP_EFFECTS),
     WHOLE_FIELD(expert, effects_off, -2147483648.0),
     REAL_FIELD(def, budget, 0.009),

@@ -77,6 +77,13 @@ typedef struct hap_expert_def {
    * fulfil the wish. hap_session_set_effect changes a wish later. */
   uint32_t effects_on;
   uint32_t effects_off;
+
+  /* model CONTACT, 1..64, default 1: parts of a step of the world, each with its own collision. The
+   * bodies that the loop does not move come out as from a world stepped at physics_hz x substeps.
+   * Forces of the application act in all parts; error reduction, softness and damping keep their
+   * meaning for the whole step. before_step and after_step come once a step, the surface callback
+   * and ODE's moved callbacks in each part. A joint's feedback is that of the last part. */
+  int32_t substeps;
 } hap_expert_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

@@ -71,22 +71,42 @@ static bool world_is_sound(hapi_physics *physics)
   return false;
 }
 
-static void global_step(hapi_physics *physics)
+static void step_part(hapi_physics *physics, double part_s)
 {
-  if (physics->cycle.step_s <= 0.0) {
-    return;
-  }
   hapi_meant meant;
-  hapi_sleep_step(&physics->world.bodies, physics->cycle.step_s);
   hapi_hold(&physics->account);
   hapi_world_convert(&physics->world, hapi_world_ratio(&physics->cycle), &meant);
   if (physics->cycle.model == HAP_MODEL_CONTACT) { /* the others are as they were published */
-    hapi_flight_prepare(&physics->world, physics->cycle.step_s);
+    hapi_flight_prepare(&physics->world, part_s);
   }
-  hapi_world_step(&physics->world, physics->cycle.step_s);
+  hapi_world_step(&physics->world, part_s);
   hapi_world_restore(&physics->world, &meant);
   hapi_feedback_tell(&physics->feedback);
   hapi_hold_let_go(&physics->account);
+}
+
+/* In parts of H, if that is wanted. Testing simulations have steps of H: contacts that are softer
+ * for a part are made once more. */
+static void global_step(hapi_physics *physics)
+{
+  hapi_cycle *cycle = &physics->cycle;
+  bool notes = physics->probe.reuse.wanted;
+  if (cycle->step_s <= 0.0) {
+    return;
+  }
+  uint32_t parts = cycle->parts > 1 ? cycle->parts : 1;
+  hapi_sleep_step(&physics->world.bodies, cycle->step_s);
+  for (uint32_t i = 0; i < parts; ++i) {
+    if (i > 0) {
+      hapi_reconcile_push_on(&physics->account);
+      hapi_world_collide(&physics->world, cycle, notes);
+    }
+    step_part(physics, cycle->step_s / (double)parts);
+  }
+  cycle->parts = 1;
+  if (parts > 1 && physics->world.notes->softened) {
+    hapi_world_collide(&physics->world, cycle, notes);
+  }
 }
 
 static void call_step(hapi_physics *physics, hap_step_fn callback)
@@ -273,6 +293,8 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
     hapi_lookback_open(&physics->lookback, now_ns);
   }
   hapi_reconcile_push(&physics->account);
+  bool in_parts = physics->cycle.model == HAP_MODEL_CONTACT && physics->cycle.step_s > 0.0;
+  physics->cycle.parts = in_parts ? physics->config.substeps : 1;
   seconds[4] += stopwatch_lap(&watch);
   hapi_physics_collide(physics);
   seconds[0] += stopwatch_lap(&watch);

@@ -301,6 +301,32 @@ void hapi_reconcile_push(hapi_account *account)
   }
 }
 
+static void push_on(dBodyID body, const double force[3], const double torque[3])
+{
+  if (dBodyIsEnabled(body)) { /* else ODE has left what it has */
+    dBodyAddForce(body, force[0], force[1], force[2]);
+    dBodyAddTorque(body, torque[0], torque[1], torque[2]);
+  }
+}
+
+void hapi_reconcile_push_on(const hapi_account *account)
+{
+  const hapi_body_table *table = &account->world->bodies;
+  for (uint32_t i = 0; i < table->high; ++i) {
+    const hapi_known_body *known = &table->entries[i];
+    if (known->body != NULL && known->pushed && !known->loop_owned) {
+      push_on(known->body, known->rest->user_force, known->rest->user_torque);
+    }
+  }
+  for (uint32_t i = 0; i < account->slots->body_high; ++i) {
+    const hapi_body_slot *slot = &account->slots->bodies[i];
+    dBodyID body = slot->phase == HAPI_SLOT_FREE ? NULL : hapi_account_body(account, slot);
+    if (body != NULL && (is_pushed(slot->exchanged) || is_pushed(slot->exchanged + 3))) {
+      push_on(body, slot->exchanged, slot->exchanged + 3);
+    }
+  }
+}
+
 /* Whether the loop moved the body by A and b in the interval that the message closes. */
 static const hapi_state_body *moved_by_loop(const hapi_account *account, uint32_t index)
 {

@@ -86,6 +86,8 @@ void hapi_reconcile_take(hapi_account *account);
 void hapi_reconcile_own(hapi_account *account);
 /* The pointers' impulse into the global step. */
 void hapi_reconcile_push(hapi_account *account);
+/* Once more, with the application's forces, as ODE has cleared them: for the next part of it. */
+void hapi_reconcile_push_on(const hapi_account *account);
 /* After the global step: eq. 14. */
 void hapi_reconcile_residual(hapi_account *account);
 /* Eq. 12 and 13. */

@@ -79,7 +79,7 @@ typedef struct hapi_file_info {
   int32_t range_hops_1; /* hap_expert_def.range_hops + 1 */
   double accuracy;
   int32_t iterations;
-  int32_t reserved; /* 0 */
+  int32_t more_substeps; /* hap_expert_def.substeps - 1 */
   double reuse;
 } hapi_file_info;
 

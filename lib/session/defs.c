@@ -35,6 +35,7 @@ static const hap_expert_def expert_defaults = {
     .iterations = HAP_BY_ACCURACY,
     .reuse = HAP_BY_ACCURACY,
     .max_hull_points = 4096,
+    .substeps = 1,
 };
 
 static const hap_research_def research_defaults = {
@@ -120,6 +121,7 @@ static hap_status def_check(const hap_session_def *def, hap_detail *detail)
       HAPI_RULE(expert, trace_rows, 0, 1048576),
       HAPI_RULE(expert, max_hull_points, 0, 1048576),
       HAPI_RULE(expert, lookback, 0.0, 0.5),
+      HAPI_RULE(expert, substeps, 1, 64),
       HAPI_RULE_OR(expert, contact_hz, HAP_BY_ACCURACY, 20.0, 1000.0),
       HAPI_RULE_OR(expert, max_edge_probes, HAP_BY_ACCURACY, 0, 1024),
       HAPI_RULE_OR(expert, max_sweeps, HAP_BY_ACCURACY, 0, 10000),

@@ -61,6 +61,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
   hapi_physics_config config = {
       .capacity = *capacity,
       .max_bodies = (uint32_t)def->max_bodies,
+      .substeps = (uint32_t)def->expert->substeps,
       .model = def->model,
       .impulse_pose = def->research->impulse_pose,
       .knobs = {.contact_hz = def->expert->contact_hz,

@@ -113,10 +113,12 @@ void hapi_session_move_defs(hapi_file_info *info, hap_session_def *def, hap_expe
   if (to_file) {
     info->drive = (int32_t)def->drive;
     info->range_hops_1 = expert->range_hops + 1;
+    info->more_substeps = expert->substeps - 1;
     info->effects = hapi_session_pack_effects(expert);
   } else {
     def->drive = HAP_DRIVE_LOCKSTEP;
     expert->range_hops = info->range_hops_1 - 1;
+    expert->substeps = info->more_substeps + 1;
     hapi_session_unpack_effects(info->effects, expert);
     research->physics_latency_ticks = HAP_LATENCY_DEFAULT;
   }

@@ -29,6 +29,7 @@ static void surface_soften(const hapi_world *world, const hapi_cycle *cycle, dSu
   if (hapi_world_ratio(cycle) == 1.0 || (s->mode & (dContactSoftERP | dContactSoftCFM)) == 0) {
     return;
   }
+  world->notes->softened = true;
   double erp = (s->mode & dContactSoftERP) != 0 ? s->soft_erp : dWorldGetERP(world->ode.world);
   double cfm = (s->mode & dContactSoftCFM) != 0 ? s->soft_cfm : dWorldGetCFM(world->ode.world);
   hapi_soften(hapi_world_ratio(cycle), &erp, &cfm);
@@ -155,6 +156,7 @@ void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes)
   dJointGroupEmpty(world->contact_group);
   hapi_world_forget_surfaces(world);
   world->notes->count = 0;
+  world->notes->softened = false;
   collide_inside(&c, world->ode.space);
   world->counts.contacts_rejected += c.rejected;
 }

@@ -42,6 +42,7 @@ typedef struct hapi_settings {
 typedef struct hapi_physics_config {
   hapi_capacity capacity;
   uint32_t max_bodies; /* that the loop may move itself; capacity.bodies is more */
+  uint32_t substeps;   /* parts of a step of the world in model CONTACT */
   hap_model model;
   hap_impulse_pose impulse_pose;
   hapi_knobs knobs;

@@ -27,6 +27,7 @@ typedef struct hapi_cycle {
   int64_t last_cycle_ns; /* time of the last cycle, for which ODE's state holds */
   hapi_state *state;     /* newest message of the loop; NULL: none yet */
   bool has_new_state;    /* state came in this cycle */
+  uint32_t parts;        /* of H, that the contacts of the collision phase are for; 0: all of it */
 } hapi_cycle;
 
 /* The step ends at now: the world is never ahead of the loop. */

@@ -109,6 +109,7 @@ double hapi_tick_ratio(const hapi_cycle *cycle)
 double hapi_world_ratio(const hapi_cycle *cycle)
 {
   double ratio = cycle->model == HAP_MODEL_SINGLE ? hapi_step_ratio(cycle) : 1.0;
+  ratio /= cycle->parts > 1 ? (double)cycle->parts : 1.0;
   return cycle->step_scale > 0.0 ? ratio * cycle->step_scale : ratio;
 }
 

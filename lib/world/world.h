@@ -28,6 +28,7 @@ typedef struct hapi_contact_notes {
   hapi_contact_note *list;
   uint32_t count;
   uint32_t capacity;
+  bool softened; /* some contacts are for another step than H */
 } hapi_contact_notes;
 
 typedef struct hapi_world_counts {
@@ -129,7 +130,7 @@ typedef struct hapi_meant {
 
 double hapi_step_ratio(const hapi_cycle *cycle);  /* T / H */
 double hapi_tick_ratio(const hapi_cycle *cycle);  /* what passes for bodies in a tick, over H */
-double hapi_world_ratio(const hapi_cycle *cycle); /* this cycle's step, over H */
+double hapi_world_ratio(const hapi_cycle *cycle); /* this cycle's step, or a part of it, over H */
 /* Constraint parameters of step H as those of step T: the same spring and damper. */
 void hapi_soften(double step_ratio, double *erp, double *cfm);
 /* For a step at T: ERP, CFM and damping of the world and its bodies as meant for H. Undone by
