@@ -262,6 +262,9 @@ static void fill_model(hapi_model *m, const hapi_capacity *c, uint64_t seed)
   m->cross_count = c->crosses;
   memset(hapi_model_crosses(m), (int)(bits_mix(seed + 3) & 0xff),
          c->crosses * sizeof(hapi_model_cross));
+  m->triangle_count = c->triangles;
+  memset(hapi_model_triangles(m), (int)(bits_mix(seed + 5) & 0xff),
+         c->triangles * sizeof(hapi_triangle));
   m->tool_count = c->tool_points;
   memset(hapi_model_tools(m), (int)(bits_mix(seed + 4) & 0xff),
          c->tool_points * sizeof(hapi_tool_point));

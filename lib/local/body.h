@@ -109,6 +109,19 @@ static inline void hapi_body_point(const hapi_local_body *body, const double loc
   hapi_v3_add(out, body->pose.position, out);
 }
 
+/* From the world to the body's frame. */
+static inline void hapi_body_unpoint(const hapi_local_body *body, const double place[3],
+                                     double out[3])
+{
+  if (body == NULL) {
+    hapi_v3_copy(place, out);
+    return;
+  }
+  double apart[3];
+  hapi_v3_sub(place, body->pose.position, apart);
+  hapi_m3_apply_transposed(body->rotation, apart, out);
+}
+
 static inline void hapi_body_vector(const hapi_local_body *body, const double local[3],
                                     double out[3])
 {

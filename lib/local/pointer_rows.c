@@ -23,19 +23,6 @@
 /* m/s: no hand comes from farther in a tick; what does was put there, and has no side. */
 #define CROSS_SPEED HAPI_PRESS_SPEED
 
-/* In the body's frame. */
-static void ball_in_body(const hapi_placed_pointer *at, double out[3])
-{
-  const double *center = at->pointer->pose.position;
-  if (at->body == NULL) {
-    hapi_v3_copy(center, out);
-    return;
-  }
-  double apart[3];
-  hapi_v3_sub(center, at->body->pose.position, apart);
-  hapi_m3_apply_transposed(at->body->rotation, apart, out);
-}
-
 /* From the body's frame to the world. */
 static void nearest_to_world(const hapi_local_body *body, hapi_nearest *io)
 {
@@ -86,11 +73,9 @@ static __attribute__((noinline)) void keep_side(hapi_local_contact *c,
   double radius = p->shape.radius;
   double ball[3];
   hapi_nearest local = *io;
-  ball_in_body(at, ball);
+  hapi_body_unpoint(at->body, p->pose.position, ball);
   if (at->body != NULL) {
-    double apart[3];
-    hapi_v3_sub(io->point_b, at->body->pose.position, apart);
-    hapi_m3_apply_transposed(at->body->rotation, apart, local.point_b);
+    hapi_body_unpoint(at->body, io->point_b, local.point_b);
     hapi_m3_apply_transposed(at->body->rotation, io->normal, local.normal);
   }
   double way[3];
@@ -132,11 +117,55 @@ static bool place_by_shape(hapi_local_contact *c, hapi_placed_pointer *at, doubl
   return true;
 }
 
-static bool ask_shape(hapi_local_contact *c, hapi_placed_pointer *at, double period,
-                      hapi_effect_sample *sample)
+/* A ball that is not known yet is on the side that the model says; one that was put there has no
+ * side. */
+static void among_enter(hapi_local_contact *c, const hapi_pointer *p, const double ball[3])
+{
+  double apart[3];
+  hapi_v3_sub(ball, c->point_body, apart);
+  double depth = p->shape.radius - hapi_v3_dot(apart, c->normal_body);
+  bool moved_in = depth > 0.0 && p->device.jump_s <= 0.0;
+  hapi_v3_madd(ball, moved_in ? depth : 0.0, c->normal_body, c->ball.center);
+  c->ball.known = true;
+}
+
+/* False: the surface is not told so far. */
+static bool place_by_triangles(const hapi_touches *touches, hapi_local_contact *c,
+                               hapi_placed_pointer *at, double period)
+{
+  const hapi_pointer *p = at->pointer;
+  double ball[3];
+  double way[3];
+  hapi_nearest nearest;
+  hapi_body_unpoint(at->body, p->pose.position, ball);
+  hapi_v3_sub(ball, c->asked.told.at, way);
+  double told = c->asked.told.within - hapi_v3_norm(way);
+  if (told < p->shape.radius) {
+    c->ball.known = false;
+    return false;
+  }
+  hapi_v3_sub(ball, c->ball.ball, way);
+  if (!c->ball.known) {
+    among_enter(c, p, ball);
+  } else if (p->device.jumped || hapi_v3_norm(way) > CROSS_SPEED * period) {
+    hapi_v3_copy(ball, c->ball.center);
+  }
+  if (!hapi_ball_among(touches->triangles + c->asked.told.first, c->asked.told.count, ball,
+                       p->shape.radius, &c->ball, &nearest)) {
+    return false;
+  }
+  hapi_body_vector(at->body, nearest.normal, c->normal_now);
+  hapi_body_point(at->body, nearest.point_b, c->point_now);
+  at->depth = -nearest.distance;
+  return true;
+}
+
+static bool ask_shape(const hapi_touches *touches, hapi_local_contact *c, hapi_placed_pointer *at,
+                      double period, hapi_effect_sample *sample)
 {
   uint64_t begin = hapi_effect_begin(sample);
-  bool found = place_by_shape(c, at, period);
+  bool found = c->asked.told.count > 0 ? place_by_triangles(touches, c, at, period)
+                                       : place_by_shape(c, at, period);
   hapi_effect_end(sample, HAP_EFFECT_SHAPE, begin);
   return found;
 }
@@ -159,7 +188,7 @@ static bool place_tool(const hapi_local_tool *tool, hapi_placed_pointer *at)
   return tool->placed;
 }
 
-static bool pointer_place(const hapi_tool_world *tools, hapi_local_contact *c, double period,
+static bool pointer_place(const hapi_touches *touches, hapi_local_contact *c, double period,
                           hapi_placed_pointer *at, hapi_effect_sample *sample)
 {
   at->normal = c->normal_now;
@@ -168,10 +197,10 @@ static bool pointer_place(const hapi_tool_world *tools, hapi_local_contact *c, d
     return false; /* another pointer has come to its place: its contacts come with the next model */
   }
   if (c->tool != 0) {
-    return place_tool(&tools->tools[c->tool - 1], at);
+    return place_tool(&touches->tool.tools[c->tool - 1], at);
   }
   hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
-  if (!c->asked.has || !ask_shape(c, at, period, sample)) {
+  if (!c->asked.has || !ask_shape(touches, c, at, period, sample)) {
     place_by_plane(c, at);
   }
   at->share = hapi_contact_ramp(c, at->pointer, &at->depth, period);
@@ -411,7 +440,7 @@ static __attribute__((noinline, cold)) void contacts_place(const hapi_tick_facts
     hapi_local_contact *c = &touches->of[i];
     hapi_placed_pointer at = {
         .index = i, .pointer = &pointers->of[c->pointer], .body = hapi_bodies_at(bodies, c->body)};
-    c->placed = pointer_place(&touches->tool, c, facts->period, &at, sample);
+    c->placed = pointer_place(touches, c, facts->period, &at, sample);
   }
   hapi_seams_hide(facts, pointers, bodies, touches);
 }
@@ -452,7 +481,7 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
       pointer_placed(&touches->tool, c, &at);
     } else {
       c->hidden = c->is_hidden;
-      placed = !facts->faulted && pointer_place(&touches->tool, c, facts->period, &at, sample);
+      placed = !facts->faulted && pointer_place(touches, c, facts->period, &at, sample);
     }
     c->row = HAPI_NO_ROW;
     touches->close += c->tool == 0 && c->ramp.depth > -CLOSE;

@@ -14,12 +14,23 @@
 #define REACH 2.0 /* radii: things that are farther have no part in the touch */
 
 /* m, from a ball to the contact's shape; false: it has none that can be asked. */
-static bool shape_distance(const hapi_local_contact *c, const hapi_local_body *body,
-                           const double center[3], double radius, double *out)
+static bool shape_distance(const hapi_touches *touches, const hapi_local_contact *c,
+                           const hapi_local_body *body, const double center[3], double radius,
+                           double *out)
 {
   hapi_touch_frame frame = {NULL, NULL};
   hapi_nearest nearest;
   if (!c->asked.has && c->asked.shape.kind != HAPI_SHAPE_PLANE) {
+    return false;
+  }
+  if (c->asked.told.count > 0) {
+    double local[3];
+    hapi_body_unpoint(body, center, local);
+    if (hapi_triangles_ball(touches->triangles + c->asked.told.first, c->asked.told.count, local,
+                            radius, &nearest)) {
+      *out = nearest.distance;
+      return true;
+    }
     return false;
   }
   if (body != NULL) {
@@ -32,19 +43,21 @@ static bool shape_distance(const hapi_local_contact *c, const hapi_local_body *b
   return true;
 }
 
-static bool contact_hides(const hapi_local_contact *by, const hapi_local_contact *c,
-                          const hapi_pointer *p, const hapi_bodies *bodies)
+static bool contact_hides(const hapi_touches *touches, const hapi_local_contact *by,
+                          const hapi_local_contact *c, const hapi_pointer *p,
+                          const hapi_bodies *bodies)
 {
   double radius = p->shape.radius;
   double step = fmin(ON_SHARE * radius, ON_MOST);
   double held[3];
   double distance;
-  if (!shape_distance(by, hapi_bodies_at(bodies, by->body), c->point_now, 0.0, &distance) ||
+  if (!shape_distance(touches, by, hapi_bodies_at(bodies, by->body), c->point_now, 0.0,
+                      &distance) ||
       distance > step) {
     return false;
   }
   hapi_v3_madd(by->point_now, radius, by->normal_now, held);
-  return shape_distance(c, hapi_bodies_at(bodies, c->body), held, radius, &distance) &&
+  return shape_distance(touches, c, hapi_bodies_at(bodies, c->body), held, radius, &distance) &&
          distance > -step;
 }
 
@@ -99,7 +112,7 @@ void hapi_seams_hide(const hapi_tick_facts *facts, const hapi_pointers *pointers
     for (uint32_t k = 0; k < touches->count && !c->hidden; ++k) {
       const hapi_local_contact *by = &touches->of[k];
       if (k != i && by->placed && by->tool == 0 && by->pointer == c->pointer &&
-          goes_before(by, c) && contact_hides(by, c, p, bodies)) {
+          goes_before(by, c) && contact_hides(touches, by, c, p, bodies)) {
         c->hidden = true;
         friction_hand_over(facts, p, bodies, touches, c, by);
       }

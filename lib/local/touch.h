@@ -67,7 +67,8 @@ typedef struct hapi_friction {
 typedef struct hapi_touch_shape {
   bool has; /* it is asked; else the shape may still be known, of a plane */
   hapi_shape shape;
-  hap_pose pose; /* body frame */
+  hap_pose pose;  /* body frame */
+  hapi_told told; /* of its surface, into hapi_touches.triangles; where it is no shape */
 } hapi_touch_shape;
 
 /* Accelerance of the body, world axes. */
@@ -209,8 +210,9 @@ typedef struct hapi_touches {
   hapi_friction *frictions; /* by contact slot; of spheres */
   hapi_tool_world tool;
   hapi_crosses crosses;
-  uint64_t contact_ticks; /* in which something pushed; this and the next since start */
-  double hand_impulse[3]; /* N s on dynamic bodies, all pointers */
+  hapi_triangle *triangles; /* of the model, each in its body's frame; capacity.triangles */
+  uint64_t contact_ticks;   /* in which something pushed; this and the next since start */
+  double hand_impulse[3];   /* N s on dynamic bodies, all pointers */
   double hand_impulse_abs;
 } hapi_touches;
 

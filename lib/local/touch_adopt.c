@@ -46,6 +46,7 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
   out->is_hidden = in->hidden != 0;
   out->asked.shape = in->shape;
   out->asked.pose = in->shape_pose;
+  out->asked.told = in->told;
   out->epoch = epoch_of(bodies, in->body);
   if (kept->generation == in->generation) {
     out->seen = true;
@@ -81,6 +82,10 @@ void hapi_touches_adopt(hapi_touches *touches, const hapi_pointers *pointers,
   touches->count = 0;
   touches->crosses.count = 0;
   touches->rubs = false;
+  if (model->triangle_count > 0) {
+    memcpy(touches->triangles, hapi_model_triangles(model),
+           model->triangle_count * sizeof *touches->triangles);
+  }
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     uint32_t pointer = in[i].pointer;
     HAPI_ASSERT_INDEX(pointer, pointers->high);

@@ -24,7 +24,7 @@ bool hapi_nearby_create(hapi_nearby *nearby, const hapi_world *world, const hapi
   slots->contacts = hapi_alloc_array(c->contacts, sizeof *slots->contacts);
   if (slots->bodies == NULL || slots->contacts == NULL || hood->candidates == NULL ||
       hood->hits == NULL || hood->vertices == NULL || hood->hull == NULL ||
-      !hapi_range_create(nearby) || !hapi_cover_create(&hood->cover)) {
+      !hapi_range_create(nearby) || !hapi_neighbors_create(nearby)) {
     return false;
   }
   hood->probe_geom = dCreateSphere(NULL, 1.0);
@@ -44,7 +44,7 @@ void hapi_nearby_finish(hapi_nearby *nearby)
   }
   hapi_range_finish(nearby);
   hapi_meshes_finish(&nearby->meshes);
-  hapi_cover_finish(&hood->cover);
+  hapi_neighbors_finish(nearby);
   hapi_free(hood->candidates);
   hapi_free(hood->hits);
   hapi_free(hood->vertices);

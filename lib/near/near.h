@@ -5,7 +5,6 @@
 
 /* What is near the pointers, and which number (slot) each body and contact has in the loop. */
 
-#include "near/fields.h"
 #include "near/meshes.h"
 #include "near/neighbors.h"
 #include "near/range.h"

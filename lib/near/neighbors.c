@@ -12,6 +12,7 @@
 #include "base/pose.h"
 #include "base/vec.h"
 #include "near/ahead.h"
+#include "near/fields.h"
 #include "near/near.h"
 #include "proximity/constrained_ball.h"
 
@@ -22,6 +23,17 @@
 #define REACH_FLOOR 0.005       /* m */
 #define DEPTH_MOST 1.0          /* m, of a touch: what is deeper has been left behind */
 #define REACH_ACCELERATION 15.0 /* m/s^2: a hand, or a body that is hit */
+
+bool hapi_neighbors_create(hapi_nearby *nearby)
+{
+  return hapi_cover_create(&nearby->neighbors.cover) && hapi_relief_create(nearby);
+}
+
+void hapi_neighbors_finish(hapi_nearby *nearby)
+{
+  hapi_cover_finish(&nearby->neighbors.cover);
+  hapi_relief_finish(nearby);
+}
 
 double hapi_neighbors_reach(double relative_speed, double horizon_s)
 {
@@ -332,7 +344,7 @@ static double hit_friction(hapi_nearby *nearby, const hapi_hit *hit,
   return fmin(mu, FRICTION_MOST);
 }
 
-static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_hit *hit,
+static void place_contact(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_hit *hit,
                           const hapi_state_pointer *pointer)
 {
   dBodyID body = dGeomGetBody(hit->geom);
@@ -349,7 +361,9 @@ static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, co
   hap_pose world = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
   hap_effect_wish wish = hapi_wish(nearby->cycle->wishes, HAP_EFFECT_SHAPE);
   slot->has_shape = hapi_shape_of_geom(hit->geom, &slot->shape, &world);
-  slot->shape_reason = !slot->has_shape                       ? HAP_REASON_NO_CLOSED_FORM
+  bool relief = !slot->has_shape && nearby->cycle->model == HAP_MODEL_CONTACT &&
+                hapi_geom_has_triangles(hit->geom);
+  slot->shape_reason = !slot->has_shape && !relief            ? HAP_REASON_NO_CLOSED_FORM
                        : slot->shape.kind == HAPI_SHAPE_PLANE ? HAP_REASON_FLAT
                                                               : HAP_REASON_CALLED;
   if (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_CALLED &&
@@ -359,6 +373,14 @@ static void place_contact(const hapi_nearby *nearby, hapi_contact_slot *slot, co
   if (wish == HAP_EFFECT_OFF ||
       (wish == HAP_EFFECT_AUTO && slot->shape_reason != HAP_REASON_CALLED)) {
     slot->has_shape = false;
+  }
+  if (relief && (wish == HAP_EFFECT_ON ||
+                 (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_CALLED))) {
+    double step = nearby->cycle->probe_step_s;
+    double speed = hapi_neighbors_speed(hit->geom, pointer, pointer->pose.position);
+    hapi_relief_note(nearby, hit->geom, pointer,
+                     pointer->radius + hapi_neighbors_reach(speed, 2.0 * step),
+                     pointer->radius + REACH_FLOOR + speed * step, slot);
   }
   slot->shape_pose = world;
   if (slot->has_shape && body != NULL) {
@@ -558,6 +580,7 @@ void hapi_neighbors_find(hapi_nearby *nearby)
   hapi_neighbors *hood = &nearby->neighbors;
   uint32_t count = 0;
   nearby->tools.count = 0;
+  hapi_relief_begin(nearby);
   hapi_slots_begin_model(nearby);
   if (!hapi_nearby_reserve_visits(nearby)) {
     hood->candidate_count = 0; /* what cannot be noted is not near */

@@ -11,6 +11,7 @@
 #include <ode/ode.h>
 
 #include "near/cover.h"
+#include "near/relief.h"
 #include "proximity/proximity.h"
 #include "sync/messages.h"
 
@@ -45,12 +46,16 @@ typedef struct hapi_neighbors {
   struct hapi_hit *hits; /* candidate_capacity */
   uint32_t hit_count;    /* that the newest model has */
   hapi_cover cover;
+  hapi_relief relief;
   bool said_crowded;        /* of what is touched and finds no room, once a session */
   double fastest;           /* m/s, of all awake bodies' surfaces */
   uint32_t current_pointer; /* while ODE calls back */
   double current_reach;
 } hapi_neighbors;
 
+/* Part of hapi_nearby_create. False: no memory; finish is due all the same. */
+bool hapi_neighbors_create(hapi_nearby *nearby);
+void hapi_neighbors_finish(hapi_nearby *nearby);
 void hapi_neighbors_collect(hapi_nearby *nearby); /* before the global step */
 void hapi_neighbors_find(hapi_nearby *nearby);    /* after it: bodies and contacts of the model */
 double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer,

@@ -10,6 +10,7 @@
 #include "base/clock.h"
 #include "base/pose.h"
 #include "base/vec.h"
+#include "near/fields.h"
 #include "near/near.h"
 
 /* The range of model CONTACT: a walk from the neighbours over what they may touch before the next

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/vec.h"
+#include "near/fields.h"
 #include "near/near.h"
 
 /* Geoms as shapes for proximity. ODE has no getters for the points of a convex geom: its collider
@@ -105,6 +106,38 @@ static bool nearest_by_collider(hapi_nearby *nearby, dGeomID geom, const double 
   out->distance = best - radius;
   hapi_v3_madd(out->point_b, out->distance, out->normal, out->point_a);
   return out->distance <= reach;
+}
+
+#define TRIANGLES_SHRINK 0.7
+
+typedef enum near_answer {
+  NEAR_NONE, /* it is farther than the reach */
+  NEAR_FOUND,
+  NEAR_UNKNOWN /* there are more triangles than can be looked at */
+} near_answer;
+
+/* Nearest point of a mesh or a heightfield, from outside. */
+static near_answer nearest_of_triangles(hapi_nearby *nearby, dGeomID geom, const double center[3],
+                                        double radius, double reach, hapi_nearest *out)
+{
+  uint32_t count = HAPI_NEAR_TRIANGLES;
+  double far = radius + reach;
+  for (; far > 1e-6; far *= TRIANGLES_SHRINK) {
+    double box[6];
+    for (int k = 0; k < 6; ++k) {
+      box[k] = center[k / 2] + (k % 2 == 0 ? -far : far);
+    }
+    count = hapi_triangles_near(nearby, geom, box, nearby->cycle->model_number + 1);
+    if (count < HAPI_NEAR_TRIANGLES) {
+      break;
+    }
+  }
+  bool cut = far < radius + reach;
+  if (count == HAPI_NEAR_TRIANGLES || (count == 0 && cut)) {
+    return NEAR_UNKNOWN;
+  }
+  bool found = hapi_triangles_nearest(&nearby->meshes, count, center, radius, out);
+  return found && out->distance <= reach ? NEAR_FOUND : NEAR_NONE;
 }
 
 /* ---- heightfields: ODE gives neither heights nor cells, but a ray meets the very triangle ---- */
@@ -246,6 +279,24 @@ bool hapi_hull_of_convex(hapi_nearby *nearby, dGeomID geom, hapi_shape *shape, h
   return count > 0;
 }
 
+/* Of a heightfield, seen from above; below it there is no other side. */
+static bool nearest_of_ground(hapi_nearby *nearby, dGeomID geom, const double center[3],
+                              double radius, double reach, hapi_nearest *out)
+{
+  field_plane below;
+  bool field = dGeomGetClass(geom) == dHeightfieldClass;
+  bool inside =
+      field && field_below(nearby, geom, center, &below) && field_height(&below, center) <= 0.0;
+  if (!inside && hapi_geom_has_triangles(geom)) {
+    near_answer answer = nearest_of_triangles(nearby, geom, center, radius, reach, out);
+    if (answer != NEAR_UNKNOWN) {
+      return answer == NEAR_FOUND;
+    }
+  }
+  return field ? nearest_on_field(nearby, geom, center, radius, reach, out)
+               : nearest_by_collider(nearby, geom, center, radius, reach, out);
+}
+
 bool hapi_geom_nearest(hapi_nearby *nearby, dGeomID geom, const double center[3], double radius,
                        double reach, hapi_nearest *out)
 {
@@ -257,9 +308,7 @@ bool hapi_geom_nearest(hapi_nearby *nearby, dGeomID geom, const double center[3]
   bool convex =
       dGeomGetClass(geom) == dConvexClass && hapi_hull_of_convex(nearby, geom, &shape, &pose);
   if (!convex && !hapi_shape_of_geom(geom, &shape, &pose)) {
-    return dGeomGetClass(geom) == dHeightfieldClass
-               ? nearest_on_field(nearby, geom, center, radius, reach, out)
-               : nearest_by_collider(nearby, geom, center, radius, reach, out);
+    return nearest_of_ground(nearby, geom, center, radius, reach, out);
   }
   /* A hull is worth asking first whether it is near at all (libccd): its box says little. */
   if (convex && !hapi_overlap(&pointer, &at, &shape, &pose, reach)) {

@@ -6,6 +6,7 @@
 #include "base/alloc.h"
 #include "base/assert.h"
 #include "base/pose.h"
+#include "near/fields.h"
 #include "near/near.h"
 #include "sync/mesh_filter.h"
 #include "sync/tool_seams.h"

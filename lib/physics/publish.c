@@ -16,6 +16,7 @@ typedef struct publishing {
   const hapi_cycle *cycle;
   const hapi_world *world;
   const hapi_slots *slots;
+  const hapi_relief *relief;
   const hapi_answers *answers;
   hapi_account *account;
 } publishing;
@@ -222,6 +223,10 @@ static void publish_contacts(const publishing *p, hapi_model *out)
   hapi_model_contact *contacts = hapi_model_contacts(out);
   out->contact_count = 0;
   out->tool_count = 0;
+  HAPI_ASSERT(p->relief->count <= p->cycle->config->capacity.triangles);
+  out->triangle_count = p->relief->count;
+  memcpy(hapi_model_triangles(out), p->relief->triangles,
+         p->relief->count * sizeof *p->relief->triangles);
   for (uint32_t i = 0; i < p->slots->contact_high; ++i) {
     const hapi_contact_slot *slot = &p->slots->contacts[i];
     if (slot->phase == HAPI_SLOT_LIVE) {
@@ -229,6 +234,8 @@ static void publish_contacts(const publishing *p, hapi_model *out)
       hapi_model_contact *contact = &contacts[out->contact_count];
       fill_contact(slot, &p->answers->contacts[i], i, contact);
       contact_scale(p->cycle->time_scale, contact);
+      contact->told = p->relief->told[i];
+      contact->has_shape |= contact->told.count > 0;
       out->contact_count += fill_tool(p, slot, out, contact);
     }
   }
@@ -393,7 +400,11 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
   HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
   hapi_cycle *cycle = &physics->cycle;
   hapi_model *out = hapi_exchange_model_back(physics->config.exchange);
-  const publishing p = {cycle, &physics->world, &physics->near.slots, &physics->probe.answers,
+  const publishing p = {cycle,
+                        &physics->world,
+                        &physics->near.slots,
+                        &physics->near.neighbors.relief,
+                        &physics->probe.answers,
                         &physics->account};
   ++cycle->model_number;
   HAPI_ASSERT(cycle->probe_step_s > 0.0);

@@ -233,6 +233,9 @@ static uint64_t hash_model(hapi_model *model)
     hash = hapi_hash_doubles(hash, c[i].turn, 6);
     hash = hapi_hash_doubles(hash, &c[i].mu, 1);
   }
+  for (uint32_t i = 0; i < model->triangle_count; ++i) {
+    hash = hapi_hash_doubles(hash, hapi_model_triangles(model)[i].corners, 9);
+  }
   hapi_tool_point *tools = hapi_model_tools(model);
   for (uint32_t i = 0; i < model->tool_count; ++i) {
     hash = hapi_hash_word(hash, tools[i].pointer);

@@ -95,6 +95,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
   return status;
 }
 
+#define TRIANGLES 2048u  /* near all pointers that are spheres */
 #define TOOL_POINTS 256u /* of all pointers that are hulls: a few dozen touches */
 
 /* Slots for the range, as many again for what stands around it, and some for those that have left
@@ -115,6 +116,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .path_rows = looks_back ? (uint32_t)(4.0 * def->haptic_hz / def->physics_hz) + 64 : 0,
       .springs = looks_back ? (uint32_t)def->max_contacts + 2 * TOOL_POINTS : 0,
       .crosses = 8 * (uint32_t)def->max_bodies,
+      .triangles = TRIANGLES,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
          capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {

@@ -5,6 +5,7 @@
 
 /* physics -> haptic: the local model. */
 
+#include "proximity/ball_among.h"
 #include "proximity/patch.h"
 #include "sync/message.h"
 #include "sync/patches.h"
@@ -168,6 +169,14 @@ typedef struct hapi_model_body {
   double response[6][6];     /* MEASURED: velocity change per impulse at the centre, world axes */
 } hapi_model_body;
 
+/* The triangles of a surface near a pointer. */
+typedef struct hapi_told {
+  uint32_t first; /* of the model's triangles, which are in the body's frame */
+  uint32_t count; /* 0: the surface is not told in triangles */
+  double at[3];   /* m, body frame: all triangles are told that come nearer than this */
+  double within;  /* m */
+} hapi_told;
+
 typedef struct hapi_model_contact {
   uint32_t slot;
   uint32_t generation;
@@ -185,6 +194,7 @@ typedef struct hapi_model_contact {
   hapi_shape shape;      /* one with a closed form against a sphere */
   hap_pose shape_pose;   /* in the body's frame */
   uint32_t tool;         /* of a hull: 1 + index into the model's tool points; 0: of a sphere */
+  hapi_told told;        /* of the surface, where it is told in triangles */
 } hapi_model_contact;
 
 /* Cross accelerance: what a force at a pointer contact does to another body. */
@@ -213,17 +223,19 @@ typedef struct hapi_model {
   uint32_t bounces;       /* surfaces and stops that bounce; model CONTACT */
   uint32_t body_count;
   uint32_t contact_count;
-  uint32_t watch_count;  /* traced bodies */
-  uint32_t joint_count;  /* model CONTACT */
-  uint32_t tool_count;   /* of models but CONTACT, where the contact thread tells them */
-  uint32_t cross_count;  /* model ACCELERANCE */
-  uint32_t course_count; /* model CONTACT */
+  uint32_t watch_count;    /* traced bodies */
+  uint32_t joint_count;    /* model CONTACT */
+  uint32_t tool_count;     /* of models but CONTACT, where the contact thread tells them */
+  uint32_t cross_count;    /* model ACCELERANCE */
+  uint32_t course_count;   /* model CONTACT */
+  uint32_t triangle_count; /* likewise */
   uint32_t bodies_offset;
   uint32_t contacts_offset;
   uint32_t joints_offset;
   uint32_t tools_offset;
   uint32_t crosses_offset;
   uint32_t courses_offset;
+  uint32_t triangles_offset;
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];      /* HAPI_SLOT_NONE: not local */
   double watch_position[HAP_TRACE_BODIES_MAX][3]; /* at state_ns */
 } hapi_model;
@@ -234,5 +246,6 @@ HAPI_MESSAGE_ARRAY(hapi_model_joints, hapi_model, hapi_model_joint, joints_offse
 HAPI_MESSAGE_ARRAY(hapi_model_tools, hapi_model, hapi_tool_point, tools_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_courses, hapi_model, hapi_model_course, courses_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_crosses, hapi_model, hapi_model_cross, crosses_offset)
+HAPI_MESSAGE_ARRAY(hapi_model_triangles, hapi_model, hapi_triangle, triangles_offset)
 
 #endif

@@ -60,6 +60,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   HAPI_ASSERT(model->body_count <= tick->capacity.bodies);
   HAPI_ASSERT(model->joint_count <= tick->capacity.joints);
   HAPI_ASSERT(model->cross_count <= tick->capacity.crosses);
+  HAPI_ASSERT(model->triangle_count <= tick->capacity.triangles);
   HAPI_ASSERT(model->watch_count <= HAP_TRACE_BODIES_MAX);
   hapi_local_bodies_adopt(&tick->bodies, model, now_ns, age_s, facts);
   solver->max_sweeps = model->max_sweeps;

@@ -37,6 +37,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(touches.tool.old_contacts, tools),
       ARRAY(touches.tool.pairs, HAPI_TOOL_PAIRS(c)),
       ARRAY(touches.crosses.of, c->crosses),
+      ARRAY(touches.triangles, c->triangles),
       ARRAY(contacts.memory, c->contacts),
       ARRAY(contacts.old_memory, c->contacts),
       ARRAY(contacts.buckets, tick->contacts.bucket_count),
