@@ -458,7 +458,7 @@ static void check_responses(test_world *w, int *measured)
 /* A cube pressed 0.2 mm into two walls and the floor, or one held by two hinges that are the
  * same and a fixed joint: more constraints than the body has ways to move, and CFM 0. Data of a
  * geom, or NULL. */
-static dTriMeshDataID build_overdetermined(test_world *w, bool walls)
+static dHeightfieldDataID build_overdetermined(test_world *w, bool walls)
 {
   dBodyID cube = world_add_cube(w, 0.1, 1.0, 0.0, 0.0, 0.05);
   dWorldSetCFM(w->world, 0.0);
@@ -489,7 +489,7 @@ TEST(an_overdetermined_body_stays_in_bounds)
     int iterations = i % 4 < 2 ? 5 : 50;
     test_world *w = world_new(9.81, iterations);
     w->def.model = i / 4 == 0 ? HAP_MODEL_ACCELERANCE : HAP_MODEL_CONTACT;
-    dTriMeshDataID data = build_overdetermined(w, i % 2 == 0);
+    dHeightfieldDataID data = build_overdetermined(w, i % 2 == 0);
     world_start(w, 0.01, -0.061, 0.02, 0.06);
     double most = 0.0;
     int measured = 0;
@@ -513,7 +513,7 @@ TEST(an_overdetermined_body_stays_in_bounds)
     CHECK(hapi_v3_norm(dBodyGetLinearVel(w->bodies[0])) < 0.5 && stats.faults.count == 0);
     world_close(w);
     if (data != NULL) {
-      dGeomTriMeshDataDestroy(data);
+      dGeomHeightfieldDataDestroy(data);
     }
   }
 }

@@ -170,7 +170,7 @@ TEST(a_measured_body_answers_all_that_touch_it_alike)
   contact_world *w = cw_new(CW_GRAVITY);
   cw_add_floor(w);
   dBodyID cube = cw_add_cube(w, 0.2, 0.05, 0.025, 0.0, 0.025);
-  dTriMeshDataID data = add_unknown_shape(w->space, cube);
+  dHeightfieldDataID data = add_unknown_shape(w->space, cube);
   (void)cw_add_cube(w, 0.2, 0.05, 0.0755, 0.0, 0.025);
   cw_start(w, -0.012, 0.003, 0.035);
   cw_move_hand(w, 0.1, 0.0, 0.0);
@@ -182,7 +182,7 @@ TEST(a_measured_body_answers_all_that_touch_it_alike)
   CHECK(met > 100);
   CHECK(w->position[1][0] > 0.08); /* it was pushed on */
   cw_close(w);
-  dGeomTriMeshDataDestroy(data);
+  dGeomHeightfieldDataDestroy(data);
 }
 
 /* The same of a cube that only two hands touch. */
@@ -194,7 +194,7 @@ TEST(a_measured_body_answers_two_hands_alike)
   contact_world *w = cw_new(CW_GRAVITY);
   cw_add_floor(w);
   dBodyID cube = cw_add_cube(w, 2.0, 0.05, 0.025, 0.0, 0.025);
-  dTriMeshDataID data = add_unknown_shape(w->space, cube);
+  dHeightfieldDataID data = add_unknown_shape(w->space, cube);
   cw_start(w, -0.012, 0.01, 0.03);
   CHECK(hap_pointer_add(w->session, &w->hand_def, &other) == HAP_OK);
   CHECK(hap_pointer_set_target(w->session, other, &pose, NULL) == HAP_OK);
@@ -206,7 +206,7 @@ TEST(a_measured_body_answers_two_hands_alike)
   CHECK(cw_stats(w).model.measured_bodies == 1);
   CHECK(met > 10);
   cw_close(w);
-  dGeomTriMeshDataDestroy(data);
+  dGeomHeightfieldDataDestroy(data);
 }
 
 /* The rest of the row answers with no more than one body's own mass. */

@@ -173,7 +173,7 @@ TEST(a_measured_body_answers_to_a_tool)
   tool_world *w = tool_new(HAP_MODEL_CONTACT);
   dWorldSetGravity(w->world, 0.0, 0.0, 0.0);
   dBodyID body = add_box(w, 0.5, half, (const double[3]){0.0, 0.0, 0.0});
-  dTriMeshDataID data = add_unknown_shape(w->space, body);
+  dHeightfieldDataID data = add_unknown_shape(w->space, body);
   tool_start(w);
   tool_go(w, -0.034, 0.005, 0.0, 0.0);
   tool_run(w, 60);
@@ -191,7 +191,7 @@ TEST(a_measured_body_answers_to_a_tool)
   CHECK_NEAR(0.5 * dBodyGetLinearVel(body)[0], impulse, 0.02 * impulse);
   CHECK(fabs(dBodyGetAngularVel(body)[2]) > 0.05); /* it was pushed beside its middle */
   tool_end(w);
-  dGeomTriMeshDataDestroy(data);
+  dGeomHeightfieldDataDestroy(data);
 }
 
 /* What is pressed goes: the body, then the pointer. */

@@ -213,7 +213,7 @@ TEST(momentum_and_spin_go_to_a_free_body)
                                   HAP_MODEL_CONTACT, HAP_MODEL_CONTACT};
   for (int m = 0; m < 5; ++m) {
     hap_stats stats;
-    dTriMeshDataID data = NULL;
+    dHeightfieldDataID data = NULL;
     dMass mass;
     double impulse[3] = {0.0, 0.0, 0.0};
     double turn[3] = {0.0, 0.0, 0.0};
@@ -250,7 +250,7 @@ TEST(momentum_and_spin_go_to_a_free_body)
     CHECK(impulse[1] > 0.01 && fabs(turn[0]) > 1e-4);
     tool_end(w);
     if (data != NULL) {
-      dGeomTriMeshDataDestroy(data);
+      dGeomHeightfieldDataDestroy(data);
     }
   }
 }

@@ -54,8 +54,21 @@ typedef struct tool_memory {
   uint32_t count;
 } tool_memory;
 
+#define GROUP_POINTS 512u
+#define SAME_PLACE 1e-7 /* m */
+#define SAME_COSINE 0.9999
+
+/* Points of the pairs of one key. */
+typedef struct pair_group {
+  uint32_t count;
+  double places[GROUP_POINTS][3];
+  double normals[GROUP_POINTS][3];
+  hapi_patch_contact contacts[GROUP_POINTS];
+} pair_group;
+
 struct hapi_contact {
   hapi_contact_config config;
+  pair_group *group;
   hapi_near *near; /* newest one that the loop is ready for; NULL: none yet */
   hapi_poses *poses;
   pass_body *bodies; /* capacity.bodies */
@@ -176,15 +189,23 @@ typedef struct placed_pair {
   hapi_patch patch;
 } placed_pair;
 
-/* A triangle's neighbours in the mesh hide its edges. */
+/* A triangle's neighbours in the mesh hide its edges. out: of the triangle. */
+static bool triangle_allows(const placed_geom *geom, const double out[3])
+{
+  double own[3];
+  if (geom->in->open_edges == 0) {
+    return true;
+  }
+  hapi_quat_unrotate(geom->pose.quat_wxyz, out, own);
+  return hapi_mesh_allows(geom->in->open_edges, geom->shape.hull, own);
+}
+
 static bool point_is_allowed(const placed_geom *a, const placed_geom *b,
                              const hapi_patch_point *point)
 {
   double into[3];
   hapi_v3_scale(-1.0, point->normal, into);
-  return (a->in->open_edges == 0 || hapi_mesh_allows(a->in->open_edges, a->shape.hull, into)) &&
-         (b->in->open_edges == 0 ||
-          hapi_mesh_allows(b->in->open_edges, b->shape.hull, point->normal));
+  return triangle_allows(a, into) && triangle_allows(b, point->normal);
 }
 
 /* The points of a pair, deepest first, that count; false: none. */
@@ -211,43 +232,122 @@ static bool find_pair(const hapi_contact *contact, uint32_t index, placed_pair *
   return count > 0;
 }
 
-static void fill_pair(const placed_pair *found, const hapi_near_pair *pair, hapi_patches *out)
+static void pair_contact(const placed_pair *found, const hapi_near_pair *pair, int point,
+                         hapi_patch_contact *out)
 {
   const hapi_touch_side side_a = geom_side(&found->a);
   const hapi_touch_side side_b = geom_side(&found->b);
+  out->body_a = found->a.in->body;
+  out->generation_a = found->a.in->generation;
+  out->body_b = found->b.in->body;
+  out->generation_b = found->b.in->generation;
+  hapi_touch_localise(&side_a, &side_b, &found->patch.points[point], out);
+  out->key = pair->key;
+}
+
+static void fill_pair(const placed_pair *found, const hapi_near_pair *pair, hapi_patches *out)
+{
   for (int i = 0; i < found->patch.count; ++i) {
     hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
-    c->body_a = found->a.in->body;
-    c->generation_a = found->a.in->generation;
-    c->body_b = found->b.in->body;
-    c->generation_b = found->b.in->generation;
-    hapi_touch_localise(&side_a, &side_b, &found->patch.points[i], c);
-    c->key = pair->key;
+    pair_contact(found, pair, i, c);
     c->surface = out->surface_count;
   }
   hapi_patches_surfaces(out)[out->surface_count++] = pair->surface;
+}
+
+/* Neighbours in a mesh share their corners and edges, and each of them finds the point there. */
+static bool group_has(const pair_group *group, const hapi_patch_point *point)
+{
+  for (uint32_t i = 0; i < group->count; ++i) {
+    double apart[3];
+    hapi_v3_sub(point->core_a, group->places[i], apart);
+    if (hapi_v3_dot(apart, apart) < SAME_PLACE * SAME_PLACE &&
+        hapi_v3_dot(point->normal, group->normals[i]) > SAME_COSINE) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* False: there is no room for all points. */
+static bool group_add(pair_group *group, const placed_pair *found, const hapi_near_pair *pair)
+{
+  for (int i = 0; i < found->patch.count; ++i) {
+    const hapi_patch_point *point = &found->patch.points[i];
+    if (group_has(group, point)) {
+      continue;
+    }
+    if (group->count == GROUP_POINTS) {
+      return false;
+    }
+    hapi_v3_copy(point->core_a, group->places[group->count]);
+    hapi_v3_copy(point->normal, group->normals[group->count]);
+    pair_contact(found, pair, i, &group->contacts[group->count++]);
+  }
+  return true;
+}
+
+/* Contacts of the pairs of one key, which are those of two geoms of which one or both are made of
+ * triangles. Returns the first pair behind them. */
+static uint32_t fill_group(hapi_contact *contact, uint32_t first, uint64_t *io_wanted,
+                           hapi_patches *out)
+{
+  const hapi_near_pair *pairs = hapi_near_pairs(contact->near);
+  pair_group *group = contact->group;
+  pass_pair *pass = &contact->pairs[first];
+  uint32_t end = first;
+  bool all = true;
+  group->count = 0;
+  pass->spare = HUGE_VAL;
+  for (; end < contact->near->pair_count && pairs[end].key == pairs[first].key; ++end) {
+    placed_pair found;
+    contact->pairs[end].count = 0;
+    if (!pass->left_out && find_pair(contact, end, &found)) {
+      pass->spare = fmin(pass->spare, found.patch.points[0].gap - found.margin);
+      all = group_add(group, &found, &pairs[end]) && all;
+    }
+  }
+  atomic_fetch_add_explicit(&contact->left_out, !all, memory_order_relaxed);
+  pass->count = group->count;
+  *io_wanted += pass->count;
+  if (pass->count > 0 && *io_wanted <= contact->config.capacity.contacts) {
+    for (uint32_t i = 0; i < pass->count; ++i) {
+      hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
+      *c = group->contacts[i];
+      c->surface = out->surface_count;
+    }
+    hapi_patches_surfaces(out)[out->surface_count++] = pairs[first].surface;
+  }
+  return end;
 }
 
 /* Contacts of the pairs that count; false: there is no room for all of them. */
 static bool fill_pairs(hapi_contact *contact, hapi_patches *out)
 {
   const uint32_t room = contact->config.capacity.contacts;
+  const hapi_near_pair *pairs = hapi_near_pairs(contact->near);
   uint64_t wanted = 0;
   out->contact_count = 0;
   out->surface_count = 0;
-  for (uint32_t i = 0; i < contact->near->pair_count; ++i) {
+  for (uint32_t i = 0; i < contact->near->pair_count;) {
     pass_pair *pair = &contact->pairs[i];
     placed_pair found;
+    if (i + 1 < contact->near->pair_count && pairs[i + 1].key == pairs[i].key) {
+      i = fill_group(contact, i, &wanted, out);
+      continue;
+    }
     if (pair->left_out || !find_pair(contact, i, &found)) {
       pair->count = 0;
+      ++i;
       continue;
     }
     pair->count = (uint32_t)found.patch.count;
     pair->spare = found.patch.points[0].gap - found.margin;
     wanted += pair->count;
     if (wanted <= room) {
-      fill_pair(&found, &hapi_near_pairs(contact->near)[i], out);
+      fill_pair(&found, &pairs[i], out);
     }
+    ++i;
   }
   return wanted <= room;
 }
@@ -725,8 +825,10 @@ hap_status hapi_contact_create(const hapi_contact_config *config, hapi_contact *
   tools->parts = hapi_alloc_array(most, sizeof *tools->parts);
   tools->points = hapi_alloc_array((size_t)TOOL_ROOM * most, sizeof *tools->points);
   tools->marks = hapi_alloc_array((size_t)TOOL_ROOM * most, sizeof *tools->marks);
-  if (contact->bodies == NULL || contact->pairs == NULL || tools->geoms == NULL ||
-      tools->parts == NULL || tools->points == NULL || tools->marks == NULL) {
+  contact->group = hapi_alloc(sizeof *contact->group);
+  if (contact->bodies == NULL || contact->pairs == NULL || contact->group == NULL ||
+      tools->geoms == NULL || tools->parts == NULL || tools->points == NULL ||
+      tools->marks == NULL) {
     hapi_contact_destroy(contact);
     return HAP_ERROR_MEMORY;
   }
@@ -746,6 +848,7 @@ void hapi_contact_destroy(hapi_contact *contact)
   hapi_free(contact->tools.parts);
   hapi_free(contact->tools.points);
   hapi_free(contact->tools.marks);
+  hapi_free(contact->group);
   hapi_free(contact);
 }
 

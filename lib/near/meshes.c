@@ -187,6 +187,8 @@ static void meet_edge(hapi_meshes *meshes, uint32_t edge)
     const double *r = edge_corner(meshes, other, 0);
     const double *s = edge_corner(meshes, other, 1);
     if ((same_point(p, s) && same_point(q, r)) || (same_point(p, r) && same_point(q, s))) {
+      meshes->found[edge / 3].joined |= 1u << (edge % 3);
+      meshes->found[other / 3].joined |= 1u << (other % 3);
       if (edge_is_closed_by(meshes, edge, other)) {
         meshes->found[edge / 3].open_edges &= ~(1u << (edge % 3));
       }
@@ -203,6 +205,7 @@ void hapi_meshes_join(hapi_meshes *meshes, uint32_t count)
   memset(meshes->places, 0, sizeof meshes->places);
   for (uint32_t i = 0; i < count; ++i) {
     meshes->found[i].open_edges = 15;
+    meshes->found[i].joined = 0;
   }
   for (uint32_t edge = 0; edge < 3 * count; ++edge) {
     meet_edge(meshes, edge);

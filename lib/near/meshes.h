@@ -32,6 +32,7 @@ typedef struct hapi_mesh {
 typedef struct hapi_near_triangle {
   double corners[9]; /* world */
   uint32_t index;
+  uint32_t joined;     /* bits 0, 1, 2: the edges that another triangle has as well */
   uint32_t open_edges; /* as in hapi_near_geom */
 } hapi_near_triangle;
 

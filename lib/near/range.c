@@ -12,6 +12,7 @@
 #include "base/vec.h"
 #include "near/fields.h"
 #include "near/near.h"
+#include "sync/mesh_filter.h"
 
 /* The range of model CONTACT: a walk from the neighbours over what they may touch before the next
  * sync, nearest first, until the loop's capacity is used. Each body gets one of four roles:
@@ -174,11 +175,12 @@ static uint64_t geom_holder(const hapi_near_geom *geom)
              : hapi_index_mix(((uint64_t)geom->body << 32) | geom->generation);
 }
 
-static void add_pair(hapi_nearby *nearby, const hapi_link *link, uint32_t geom_b, uint32_t part)
+/* part: 0, or of the other geom. Pairs of one key follow each other. */
+static void add_pair(hapi_nearby *nearby, const hapi_link *link, uint32_t geom_a, uint32_t geom_b,
+                     uint32_t part)
 {
   hapi_range *range = &nearby->range;
   hapi_near *near = range->near;
-  uint32_t geom_a = take_geom(nearby, link->own);
   bool turned = link->turned;
   if (geom_a == HAPI_NONE || geom_b == HAPI_NONE ||
       near->pair_count == nearby->cycle->config->capacity.contacts) {
@@ -195,8 +197,9 @@ static void add_pair(hapi_nearby *nearby, const hapi_link *link, uint32_t geom_b
   pair->surface = link->surface;
 }
 
-/* Index of the triangle's geom in the message, in the static world; HAPI_NONE: no room. */
-static uint32_t add_triangle(hapi_nearby *nearby, const hapi_near_triangle *triangle)
+/* Index of the triangle's geom in the message; body: that carries it, NULL: the static world.
+ * HAPI_NONE: no room. */
+static uint32_t add_triangle(hapi_nearby *nearby, const hapi_near_triangle *triangle, dBodyID body)
 {
   hapi_range *range = &nearby->range;
   hapi_near *near = range->near;
@@ -206,6 +209,7 @@ static uint32_t add_triangle(hapi_nearby *nearby, const hapi_near_triangle *tria
     return HAPI_NONE;
   }
   hapi_near_geom *out = &hapi_near_geoms(near)[near->geom_count];
+  double *corners = hapi_near_points(near) + (size_t)3 * near->point_count;
   memset(out, 0, sizeof *out);
   fill_static(out);
   out->shape.kind = HAPI_SHAPE_HULL;
@@ -213,24 +217,188 @@ static uint32_t add_triangle(hapi_nearby *nearby, const hapi_near_triangle *tria
   out->hull_first = near->point_count;
   out->open_edges = triangle->open_edges;
   out->pose.quat_wxyz[0] = 1.0;
-  memcpy(hapi_near_points(near) + (size_t)3 * near->point_count, triangle->corners,
-         sizeof triangle->corners);
+  memcpy(corners, triangle->corners, sizeof triangle->corners);
   near->point_count += 3;
+  if (body != NULL) {
+    uint32_t slot = known_body(nearby, hapi_bodies_find(&nearby->world->bodies, body))->slot;
+    out->body = slot;
+    out->generation = nearby->slots.bodies[slot].generation;
+    for (int k = 0; k < 9; k += 3) {
+      double *corner = corners + k;
+      hapi_pose_unpoint(dBodyGetPosition(body), dBodyGetQuaternion(body), corner, corner);
+      out->extent = fmax(out->extent, hapi_v3_norm(corner));
+    }
+  }
   range->geoms[near->geom_count] = NULL; /* not to be found by its geom */
   return near->geom_count++;
 }
 
-/* The triangles of static ground near a geom, each as a geom of its own. */
-static void add_mesh(hapi_nearby *nearby, const hapi_link *link)
+/* ---- triangles: each is a geom of its own ---- */
+
+static bool link_has_parts(const hapi_link *link)
 {
-  uint32_t count = hapi_triangles_near(nearby, link->other, link->box, nearby->range.number);
-  for (uint32_t i = 0; i < count && count < HAPI_NEAR_TRIANGLES; ++i) {
-    const hapi_near_triangle *triangle = &nearby->meshes.found[i];
-    uint32_t geom = add_triangle(nearby, triangle);
-    if (geom == HAPI_NONE) {
+  return hapi_geom_has_triangles(link->own) || hapi_geom_has_triangles(link->other);
+}
+
+/* Of the meshes of a link what may meet. */
+typedef struct link_parts {
+  uint32_t own;   /* triangles, in range.own_triangles; 0: not a mesh */
+  uint32_t other; /* in near.meshes.found */
+  uint32_t pairs;
+  bool own_is_mesh;
+  bool other_is_mesh;
+  bool all; /* they are all there */
+} link_parts;
+
+static double link_slack(const hapi_link *link)
+{
+  dReal box[6];
+  dGeomGetAABB(link->own, box);
+  return box[0] - link->box[0];
+}
+
+static void triangle_box(const double corners[9], double slack, double out[6])
+{
+  for (int k = 0; k < 3; ++k) {
+    out[2 * k] = fmin(fmin(corners[k], corners[3 + k]), corners[6 + k]) - slack;
+    out[2 * k + 1] = fmax(fmax(corners[k], corners[3 + k]), corners[6 + k]) + slack;
+  }
+}
+
+/* A body's mesh is solid, so a triangle of it that has neighbours all round has one side. */
+static void triangles_close(hapi_near_triangle *triangles, uint32_t count)
+{
+  for (uint32_t i = 0; i < count; ++i) {
+    triangles[i].open_edges |= triangles[i].joined == 7 ? HAPI_TRIANGLE_SOLID : 0;
+  }
+}
+
+static bool triangle_is_near(const hapi_near_triangle *triangle, const hapi_link *link,
+                             double slack)
+{
+  double box[6];
+  dReal other[6];
+  if (dGeomGetClass(link->other) == dPlaneClass) {
+    dVector4 plane;
+    double lowest = HUGE_VAL;
+    dGeomPlaneGetParams(link->other, plane);
+    for (int k = 0; k < 9; k += 3) {
+      lowest = fmin(lowest, hapi_v3_dot(plane, triangle->corners + k) - plane[3]);
+    }
+    return lowest <= slack;
+  }
+  triangle_box(triangle->corners, slack, box);
+  dGeomGetAABB(link->other, other);
+  return hapi_boxes_meet(box, other);
+}
+
+/* Into range.own_triangles: those of the link's own mesh that may meet the other geom. */
+static uint32_t own_triangles(hapi_nearby *nearby, const hapi_link *link)
+{
+  hapi_near_triangle *own = nearby->range.own_triangles;
+  uint32_t count = hapi_triangles_near(nearby, link->own, link->box, nearby->range.number);
+  uint32_t kept = 0;
+  if (count == HAPI_NEAR_TRIANGLES) {
+    return count;
+  }
+  double slack = link_slack(link);
+  for (uint32_t i = 0; i < count; ++i) {
+    if (triangle_is_near(&nearby->meshes.found[i], link, slack)) {
+      own[kept++] = nearby->meshes.found[i];
+    }
+  }
+  triangles_close(own, kept);
+  return kept;
+}
+
+static bool triangles_meet(const hapi_near_triangle *a, const hapi_near_triangle *b, double slack)
+{
+  double boxes[2][6];
+  triangle_box(a->corners, slack, boxes[0]);
+  triangle_box(b->corners, 0.0, boxes[1]);
+  return hapi_boxes_meet(boxes[0], boxes[1]);
+}
+
+/* Of two meshes pairs are looked for one by one. */
+#define MEETINGS_MOST (1u << 18)
+
+static void parts_find(hapi_nearby *nearby, const hapi_link *link, link_parts *out)
+{
+  *out = (link_parts){.own_is_mesh = hapi_geom_has_triangles(link->own),
+                      .other_is_mesh = hapi_geom_has_triangles(link->other)};
+  out->own = out->own_is_mesh ? own_triangles(nearby, link) : 1;
+  out->other = out->other_is_mesh
+                   ? hapi_triangles_near(nearby, link->other, link->box, nearby->range.number)
+                   : 1;
+  out->all = out->own < HAPI_NEAR_TRIANGLES && out->other < HAPI_NEAR_TRIANGLES &&
+             out->own * out->other <= MEETINGS_MOST;
+  if (!out->all) {
+    return;
+  }
+  if (out->other_is_mesh && dGeomGetBody(link->other) != NULL) {
+    triangles_close(nearby->meshes.found, out->other);
+  }
+  out->pairs = out->own * out->other;
+  if (out->own_is_mesh && out->other_is_mesh) {
+    double slack = link_slack(link);
+    out->pairs = 0;
+    for (uint32_t i = 0; i < out->own; ++i) {
+      for (uint32_t k = 0; k < out->other; ++k) {
+        out->pairs +=
+            triangles_meet(&nearby->range.own_triangles[i], &nearby->meshes.found[k], slack);
+      }
+    }
+  }
+}
+
+static void add_meeting(hapi_nearby *nearby, const hapi_link *link, const link_parts *parts,
+                        uint32_t own, uint32_t other_first)
+{
+  const hapi_near_triangle *triangles = nearby->meshes.found;
+  const hapi_near_triangle *self = &nearby->range.own_triangles[own];
+  double slack = link_slack(link);
+  uint32_t geom = add_triangle(nearby, self, dGeomGetBody(link->own));
+  for (uint32_t k = 0; k < parts->other; ++k) {
+    if (triangles_meet(self, &triangles[k], slack)) {
+      add_pair(nearby, link, geom, other_first + k, 0);
+    }
+  }
+}
+
+/* The triangles of a link as geoms, and what they may meet. can_be_owned has seen that there is
+ * room. */
+static void add_parts(hapi_nearby *nearby, const hapi_link *link)
+{
+  link_parts parts;
+  dBodyID other = dGeomGetBody(link->other);
+  parts_find(nearby, link, &parts);
+  if (!parts.all || parts.pairs == 0) {
+    return;
+  }
+  if (!parts.own_is_mesh) {
+    uint32_t own = take_geom(nearby, link->own);
+    for (uint32_t i = 0; i < parts.other; ++i) {
+      uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i], other);
+      add_pair(nearby, link, own, geom, 0);
+    }
+    return;
+  }
+  if (!parts.other_is_mesh) {
+    uint32_t geom = take_geom(nearby, link->other);
+    for (uint32_t i = 0; i < parts.own; ++i) {
+      uint32_t own = add_triangle(nearby, &nearby->range.own_triangles[i], dGeomGetBody(link->own));
+      add_pair(nearby, link, own, geom, 0);
+    }
+    return;
+  }
+  uint32_t first = nearby->range.near->geom_count;
+  for (uint32_t i = 0; i < parts.other; ++i) {
+    if (add_triangle(nearby, &nearby->meshes.found[i], other) == HAPI_NONE) {
       return;
     }
-    add_pair(nearby, link, geom, triangle->index + 1);
+  }
+  for (uint32_t i = 0; i < parts.own; ++i) {
+    add_meeting(nearby, link, &parts, i, first);
   }
 }
 
@@ -286,20 +454,7 @@ static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
       .side = hapi_tool_told(nearby, hit->geom, hit->pointer)};
   uint32_t count = hapi_tool_triangles(nearby, &box, nearby->range.number);
   for (uint32_t i = 0; i < count; ++i) {
-    uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i]);
-    if (geom != HAPI_NONE && body != NULL) {
-      /* The corners of a mesh that a body carries, in the body's frame. */
-      hapi_near_geom *out = &hapi_near_geoms(nearby->range.near)[geom];
-      double *corners = hapi_near_points(nearby->range.near) + (size_t)3 * out->hull_first;
-      uint32_t slot = known_body(nearby, hapi_bodies_find(&nearby->world->bodies, body))->slot;
-      out->body = slot;
-      out->generation = nearby->slots.bodies[slot].generation;
-      for (int k = 0; k < 3; ++k) {
-        double *corner = corners + (size_t)3 * k;
-        hapi_pose_unpoint(dBodyGetPosition(body), dBodyGetQuaternion(body), corner, corner);
-        out->extent = fmax(out->extent, hapi_v3_norm(corner));
-      }
-    }
+    uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i], body);
     add_tool_pair(nearby, hit, geom);
   }
 }
@@ -340,6 +495,7 @@ static bool geom_is_known(dGeomID geom)
     case dConvexClass:
       return true;
     case dTriMeshClass:
+      return true;
     case dHeightfieldClass:
       return dGeomGetBody(geom) == NULL;
     default:
@@ -486,6 +642,19 @@ static bool body_is_known(const hapi_nearby *nearby, dBodyID body)
   return body == NULL || hapi_bodies_find(&nearby->world->bodies, body) != HAPI_NONE;
 }
 
+/* Two meshes that bodies carry: only ODE's collider knows them. */
+static bool meshes_move(hapi_nearby *nearby, const hapi_link *link)
+{
+  bool both = dGeomGetClass(link->own) == dTriMeshClass &&
+              dGeomGetClass(link->other) == dTriMeshClass && dGeomGetBody(link->other) != NULL;
+  if (both) {
+    hapi_say_once(nearby->cycle, &nearby->range.said_meshes,
+                  "two bodies whose geoms are triangle meshes are near each other: they are "
+                  "measured, which is less accurate than what the loop moves itself");
+  }
+  return both;
+}
+
 bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_range_need *io)
 {
   const hapi_range *range = &nearby->range;
@@ -500,7 +669,8 @@ bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_
   }
   for (uint32_t i = 0; i < range->links.count; ++i) {
     dGeomID other = range->links.list[i].other;
-    if (!geom_is_known(other) || !body_is_known(nearby, dGeomGetBody(other))) {
+    if (!geom_is_known(other) || !body_is_known(nearby, dGeomGetBody(other)) ||
+        meshes_move(nearby, &range->links.list[i])) {
       return false;
     }
   }
@@ -512,16 +682,22 @@ bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_
   }
   for (uint32_t i = 0; i < range->links.count; ++i) {
     const hapi_link *link = &range->links.list[i];
-    if (!hapi_geom_has_triangles(link->other)) {
+    if (!link_has_parts(link)) {
       need_geom(nearby, link->other, io);
       ++io->pairs;
       continue;
     }
-    uint32_t count = hapi_triangles_near(nearby, link->other, link->box, nearby->range.number);
-    bool all = count < HAPI_NEAR_TRIANGLES;
-    io->geoms += count;
-    io->points += 3 * count;
-    io->pairs += all ? count : nearby->cycle->config->capacity.contacts + 1;
+    link_parts parts;
+    parts_find(nearby, link, &parts);
+    uint32_t triangles =
+        parts.all ? (parts.own_is_mesh ? parts.own : 0) + (parts.other_is_mesh ? parts.other : 0)
+                  : 0;
+    io->geoms += triangles;
+    io->points += 3 * triangles;
+    io->pairs += parts.all ? parts.pairs : c->contacts + 1;
+    if (!parts.other_is_mesh) {
+      need_geom(nearby, link->other, io);
+    }
   }
   return range->near->geom_count + io->geoms <= c->geoms &&
          range->near->point_count + io->points <= c->hull_points &&
@@ -551,10 +727,11 @@ static void take_links(hapi_nearby *nearby)
     if (body != NULL) {
       nearby->slots.bodies[known_body(nearby, known)->slot].linked = true;
     }
-    if (hapi_geom_has_triangles(link->other)) {
-      add_mesh(nearby, link);
+    if (link_has_parts(link)) {
+      add_parts(nearby, link);
     } else {
-      add_pair(nearby, link, take_geom(nearby, link->other), 0);
+      uint32_t own = take_geom(nearby, link->own);
+      add_pair(nearby, link, own, take_geom(nearby, link->other), 0);
     }
   }
 }
@@ -782,11 +959,12 @@ bool hapi_range_create(hapi_nearby *nearby)
   }
   range->links.pair_places =
       hapi_alloc_array(range->links.pair_place_count, sizeof *range->links.pair_places);
+  range->own_triangles = hapi_alloc_array(HAPI_NEAR_TRIANGLES, sizeof *range->own_triangles);
   range->links.box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
-  return range->queue != NULL && range->geoms != NULL && range->mechanism.members != NULL &&
-         range->mechanism.joints != NULL && range->links.pair_places != NULL &&
-         range->ahead.island != NULL && range->links.box_geom != NULL &&
-         hapi_cover_create(&range->links.cover);
+  return range->own_triangles != NULL && range->queue != NULL && range->geoms != NULL &&
+         range->mechanism.members != NULL && range->mechanism.joints != NULL &&
+         range->links.pair_places != NULL && range->ahead.island != NULL &&
+         range->links.box_geom != NULL && hapi_cover_create(&range->links.cover);
 }
 
 void hapi_range_finish(hapi_nearby *nearby)
@@ -798,6 +976,7 @@ void hapi_range_finish(hapi_nearby *nearby)
   hapi_cover_finish(&range->links.cover);
   hapi_free(range->queue);
   hapi_free(range->geoms);
+  hapi_free(range->own_triangles);
   hapi_free(range->links.list);
   hapi_free(range->ahead.island);
   hapi_free(range->ahead.comers);

@@ -75,9 +75,11 @@ typedef struct hapi_range_need {
 typedef struct hapi_range {
   hapi_near *near;     /* message being written */
   bool said_contacted; /* of contact joints of the application, once a session */
-  dGeomID *geoms;      /* of its geoms; capacity.geoms */
-  uint64_t number;     /* of the walk: that of its model */
-  uint32_t *queue;     /* entries of the body table; capacity.bodies */
+  bool said_meshes;    /* of two that move, likewise */
+  struct hapi_near_triangle *own_triangles; /* of a mesh that moves; HAPI_NEAR_TRIANGLES */
+  dGeomID *geoms;                           /* of its geoms; capacity.geoms */
+  uint64_t number;                          /* of the walk: that of its model */
+  uint32_t *queue;                          /* entries of the body table; capacity.bodies */
   uint32_t count;
   uint32_t owned;
   int32_t hops;     /* of what is put into the queue now */

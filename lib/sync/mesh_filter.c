@@ -15,6 +15,7 @@
 #define OWN_NORMAL_COSINE 0.99996 /* 0.5 degrees */
 #define TRIANGLE 8u
 
+#define BEHIND_SINE 1e-3   /* 0.06 degrees */
 #define FLAT_COSINE 0.9962 /* 5 degrees, as of patches of two faces */
 
 void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
@@ -43,7 +44,7 @@ void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
 bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double normal[3])
 {
   HAPI_ASSERT_UNIT(normal);
-  HAPI_ASSERT((open_edges & ~15u) == 0);
+  HAPI_ASSERT((open_edges & ~31u) == 0);
   double sides[3][3];
   double own[3];
   if ((open_edges & TRIANGLE) == 0) {
@@ -55,6 +56,9 @@ bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double n
   hapi_v3_cross(sides[0], sides[1], own);
   double area = hapi_v3_norm(own);
   double lean = area > 0.0 ? hapi_v3_dot(own, normal) / area : 1.0;
+  if ((open_edges & HAPI_TRIANGLE_SOLID) != 0 && lean < -BEHIND_SINE) {
+    return false;
+  }
   if (fabs(lean) >= OWN_NORMAL_COSINE) {
     return true;
   }

@@ -8,6 +8,8 @@
 
 #include "proximity/patch.h"
 
+#define HAPI_TRIANGLE_SOLID 16u /* of open_edges: nothing touches it from behind */
+
 /* Whether a contact with a triangle of a mesh is one with the mesh. open_edges: as in
  * hapi_near_geom; corners: 3 x 3, in the axes of the normal, which points out of the triangle. */
 bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double normal[3]);

@@ -16,7 +16,8 @@ typedef struct hapi_near_geom {
   double extent;       /* m, of a hull: farthest point from the frame's origin */
   uint32_t hull_first; /* into the message's points */
   uint32_t open_edges; /* bit 3: a triangle of a mesh; bits 0, 1, 2: its edges that can be touched,
-                          because no neighbour continues its plane or rises there */
+                          because no neighbour continues its plane or rises there; bit 4: it has
+                          one side (HAPI_TRIANGLE_SOLID) */
   hap_pose pose;       /* in the body's frame; world for the static world */
 } hapi_near_geom;
 

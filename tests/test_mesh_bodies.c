@@ -1,0 +1,260 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Bodies that are made of triangles: they lie and slide as the same bodies of boxes do. */
+
+#include <stdatomic.h>
+
+#include "tests/tap.h"
+
+#include "tests/contact_world.h"
+
+#define BARS_MAX 4
+
+/* A body of boxes, whose triangles can stand for them. The boxes do not touch each other. */
+typedef struct bars {
+  int count;
+  double at[BARS_MAX][3];
+  double half[BARS_MAX][3];
+} bars;
+
+static const bars crate = {1, {{0.0, 0.0, 0.0}}, {{0.025, 0.025, 0.025}}};
+static const bars sledge = {2,
+                            {{0.0, -0.03, 0.0}, {0.0, 0.03, 0.0}},
+                            {{0.05, 0.01, 0.015}, {0.05, 0.01, 0.015}}}; /* two runners */
+
+typedef struct solid {
+  dTriMeshDataID data;
+  double corners[8 * BARS_MAX * 3];
+  dTriIndex triangles[36 * BARS_MAX];
+} solid;
+
+static void solid_fill(const bars *b, solid *out)
+{
+  static const int faces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                  {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  dTriIndex *at = out->triangles;
+  for (int n = 0; n < b->count; ++n) {
+    for (int i = 0; i < 8; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        double side = ((i >> k) & 1) != 0 ? 1.0 : -1.0;
+        out->corners[3 * (8 * n + i) + k] = b->at[n][k] + side * b->half[n][k];
+      }
+    }
+    for (int f = 0; f < 6; ++f) {
+      static const int split[6] = {0, 1, 2, 0, 2, 3};
+      for (int k = 0; k < 6; ++k) {
+        *at++ = (dTriIndex)(8 * n + faces[f][split[k]]);
+      }
+    }
+  }
+  out->data = dGeomTriMeshDataCreate();
+  dGeomTriMeshDataBuildDouble(out->data, out->corners, 3 * sizeof(double), 8 * b->count,
+                              out->triangles, 36 * b->count, 3 * sizeof(dTriIndex));
+}
+
+static dBodyID add_bars(contact_world *w, const bars *b, solid *mesh, const double at[3])
+{
+  dMass mass;
+  dMassSetBoxTotal(&mass, 0.5, 0.06, 0.06, 0.05);
+  if (mesh != NULL) {
+    solid_fill(b, mesh);
+    return cw_add(w, dCreateTriMesh(w->space, mesh->data, NULL, NULL, NULL), &mass, at[0], at[1],
+                  at[2]);
+  }
+  dBodyID body = cw_add(w, NULL, &mass, at[0], at[1], at[2]);
+  for (int n = 0; n < b->count; ++n) {
+    const double *h = b->half[n];
+    dGeomID geom = dCreateBox(w->space, 2.0 * h[0], 2.0 * h[1], 2.0 * h[2]);
+    dGeomSetBody(geom, body);
+    dGeomSetOffsetPosition(geom, b->at[n][0], b->at[n][1], b->at[n][2]);
+  }
+  return body;
+}
+
+typedef enum ground {
+  GROUND_PLANE,
+  GROUND_BOX,
+  GROUND_RAILS, /* two capsules */
+  GROUND_BALLS,
+  GROUND_DRUM,
+  GROUND_MESH, /* level */
+  GROUND_FIELD,
+  GROUNDS
+} ground;
+
+static const char *const ground_names[] = {"plane", "box",  "rails", "balls",
+                                           "drum",  "mesh", "field"};
+
+typedef struct ground_data {
+  dTriMeshDataID mesh;
+  dHeightfieldDataID field;
+} ground_data;
+
+/* All have their highest point at 0. */
+static void add_ground(contact_world *w, ground kind, ground_data *out)
+{
+  static const double corners[] = {-0.4, -0.4, 0.0, 0.4, -0.4, 0.0, 0.4, 0.4, 0.0, -0.4, 0.4, 0.0};
+  static const dTriIndex triangles[] = {0, 1, 2, 0, 2, 3};
+  static double heights[49];
+  dMatrix3 turned;
+  switch (kind) {
+    case GROUND_PLANE:
+      cw_add_floor(w);
+      break;
+    case GROUND_BOX:
+      dGeomSetPosition(dCreateBox(w->space, 0.8, 0.8, 0.1), 0.0, 0.0, -0.05);
+      break;
+    case GROUND_RAILS:
+      for (int i = 0; i < 2; ++i) {
+        dGeomID rail = dCreateCapsule(w->space, 0.02, 1.0);
+        dRFromAxisAndAngle(turned, 0.0, 1.0, 0.0, 0.5 * M_PI);
+        dGeomSetRotation(rail, turned);
+        dGeomSetPosition(rail, 0.0, i == 0 ? -0.02 : 0.02, -0.02);
+      }
+      break;
+    case GROUND_BALLS:
+      for (int i = 0; i < 3; ++i) {
+        dGeomSetPosition(dCreateSphere(w->space, 0.2), 0.03 * (i == 2) - 0.01,
+                         i == 2 ? 0.0 : 0.04 * i - 0.02, -0.2);
+      }
+      break;
+    case GROUND_DRUM:
+      dGeomSetPosition(dCreateCylinder(w->space, 0.4, 0.1), 0.0, 0.0, -0.05);
+      break;
+    case GROUND_MESH:
+      out->mesh = dGeomTriMeshDataCreate();
+      dGeomTriMeshDataBuildDouble(out->mesh, corners, 3 * sizeof(double), 4, triangles, 6,
+                                  3 * sizeof(dTriIndex));
+      dCreateTriMesh(w->space, out->mesh, NULL, NULL, NULL);
+      break;
+    case GROUND_FIELD:
+      out->field = dGeomHeightfieldDataCreate();
+      dGeomHeightfieldDataBuildDouble(out->field, heights, 0, 0.8, 0.8, 7, 7, 1.0, 0.0, 1.0, 0);
+      dRFromAxisAndAngle(turned, 1.0, 0.0, 0.0, 0.5 * M_PI);
+      dGeomSetRotation(dCreateHeightfield(w->space, out->field, 1), turned);
+      break;
+    case GROUNDS:
+      break;
+  }
+}
+
+#define TICKS 500
+
+typedef struct course {
+  double force[TICKS][3];
+  double at[3];
+  uint32_t owned;
+  uint32_t measured;
+} course;
+
+/* Pushed along x, on ground, by a sphere. */
+static void course_run(const bars *b, bool as_mesh, ground kind, double physics_hz, course *out)
+{
+  static solid mesh;
+  ground_data ends = {NULL, NULL};
+  contact_world w;
+  cw_open(&w, CW_GRAVITY);
+  w.def.physics_hz = physics_hz;
+  const double half = b->half[0][2];
+  add_bars(&w, b, as_mesh ? &mesh : NULL, (const double[3]){0.0, 0.0, half - 1e-4});
+  add_ground(&w, kind, &ends);
+  const double side = b->at[0][1];
+  cw_start(&w, -b->half[0][0] - 0.012, side, 0.8 * half);
+  cw_move_hand(&w, 0.06, 0.0, 0.0);
+  for (int i = 0; i < TICKS; ++i) {
+    cw_tick(&w);
+    memcpy(out->force[i], w.force, sizeof out->force[i]);
+  }
+  hap_stats stats = cw_stats(&w);
+  out->owned = stats.model.range_bodies;
+  out->measured = stats.model.measured_bodies;
+  memcpy(out->at, w.position[0], sizeof out->at);
+  cw_close(&w);
+  if (as_mesh) {
+    dGeomTriMeshDataDestroy(mesh.data);
+  }
+  if (ends.mesh != NULL) {
+    dGeomTriMeshDataDestroy(ends.mesh);
+  }
+  if (ends.field != NULL) {
+    dGeomHeightfieldDataDestroy(ends.field);
+  }
+}
+
+static void course_compare(const bars *b, const char *name, ground kind, double hz)
+{
+  static course mesh;
+  static course box;
+  double off = 0.0;
+  double sum = 0.0;
+  double apart = 0.0;
+  course_run(b, true, kind, hz, &mesh);
+  course_run(b, false, kind, hz, &box);
+  for (int i = 0; i < TICKS; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      double d = mesh.force[i][k] - box.force[i][k];
+      off += d * d;
+      sum += box.force[i][k] * box.force[i][k];
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    apart = fmax(apart, fabs(mesh.at[k] - box.at[k]));
+  }
+  printf("# %s on %s, %.0f Hz: force %.3f %% off, %.2g mm apart of %.0f mm\n", name,
+         ground_names[kind], hz, 100.0 * sqrt(off / sum), 1e3 * apart, 1e3 * box.at[0]);
+  CHECK(mesh.owned == 1 && mesh.measured == 0);
+  CHECK(box.at[0] > 0.005);
+  CHECK(off < 0.02 * 0.02 * sum);
+  CHECK(apart < 2e-4);
+}
+
+TEST(a_crate_of_triangles_slides_as_a_box)
+{
+  for (int kind = 0; kind < GROUNDS; ++kind) {
+    course_compare(&crate, "crate", (ground)kind, 20.0);
+  }
+}
+
+/* What is not convex. */
+TEST(a_sledge_of_triangles_slides_as_its_runners)
+{
+  course_compare(&sledge, "sledge", GROUND_PLANE, 60.0);
+  course_compare(&sledge, "sledge", GROUND_BOX, 20.0);
+  course_compare(&sledge, "sledge", GROUND_MESH, 20.0);
+  course_compare(&sledge, "sledge", GROUND_FIELD, 20.0);
+}
+
+static _Atomic int said;
+
+static void count_said(hap_log_level level, const char *text, void *user)
+{
+  (void)user;
+  if (level >= HAP_LOG_WARNING && strstr(text, "triangle meshes") != NULL) {
+    atomic_fetch_add(&said, 1);
+  }
+}
+
+/* Two of them near each other are measured, and that is said once. */
+TEST(two_crates_of_triangles_are_measured)
+{
+  static solid meshes[2];
+  contact_world w;
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.log = count_said;
+  REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
+  cw_open(&w, CW_GRAVITY);
+  cw_add_floor(&w);
+  add_bars(&w, &crate, &meshes[0], (const double[3]){0.0, 0.0, 0.0249});
+  add_bars(&w, &crate, &meshes[1], (const double[3]){0.06, 0.0, 0.0249});
+  cw_start(&w, -0.04, 0.0, 0.02);
+  cw_run(&w, 300);
+  hap_stats stats = cw_stats(&w);
+  CHECK(stats.model.range_bodies == 0 && stats.model.measured_bodies >= 1);
+  CHECK(atomic_load(&said) == 1);
+  cw_close(&w);
+  CHECK(hap_hooks_set(NULL) == HAP_OK);
+  dGeomTriMeshDataDestroy(meshes[0].data);
+  dGeomTriMeshDataDestroy(meshes[1].data);
+}
