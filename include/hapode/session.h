@@ -97,9 +97,9 @@ HAP_API hap_status hap_session_stop(hap_session *session);
  * calls, at most 3. frame_s is the time since the last call, s, 0..86400. The rest is dropped and
  * counted (HAP_DROPPED, hap_stats.physics.frames_dropped).
  *
- * For slow motion and pauses see hap_session_set_time_scale. Frames with less time than the clock's
- * leave the world behind the loop, which goes on with the nearby bodies. After two steps without a
- * frame the force fades; it comes back by itself. Model SINGLE needs another drive: its steps are those of the haptic loop.
+ * Slow motion and pauses: hap_session_set_time_scale. Less frame time than the clock's leaves the
+ * world behind the loop. After two steps without a frame the force fades; it comes back by itself.
+ * Model SINGLE needs another drive: its steps are those of the haptic loop.
  *
  * HAP_FAULTED, HAP_BODY_LOST: see their texts. On an error nothing is done and the remainder stays.
  * HAP_ERROR_ARGUMENT: frame_s is out of range. HAP_ERROR_STATE: another drive, or not started.
@@ -119,12 +119,12 @@ HAP_API int64_t hap_session_now(const hap_session *session);
  * HAP_ERROR_STATE: the session plays a recording. */
 HAP_NODISCARD HAP_API hap_status hap_session_set_model(hap_session *session, hap_model model);
 
-/* [any] Slow motion: from the next sync on bodies see this share of the hand's time, 0..1; 1 (at
- * create). 0 is a pause: bodies stand, nothing moves them, and all of them are felt as walls. Below
- * 0.001, and not 0, is HAP_ERROR_ARGUMENT. All drives; physics_hz stays the rate of syncs, steps of
- * the world get shorter (step_s of the callbacks), and none are made in a pause. Contact springs and
- * dampers of pointers belong to the hand's time. What the application sets of joints, surfaces and
- * velocities is in the bodies' time. HAP_ERROR_STATE: the session plays a recording, which has it. */
+/* [any] Slow motion, in all drives: from the next sync on bodies see this share of the hand's time,
+ * 0.001..1; 1 at create. 0 is a pause: bodies stand, nothing moves them, all are felt as walls. The
+ * rate of syncs stays physics_hz; steps of the world are shorter (step_s of callbacks), a pause has
+ * none. Springs and dampers of pointers belong to the hand's time, velocities of bodies, joints and
+ * surfaces to the bodies'. HAP_ERROR_ARGUMENT: out of range. HAP_ERROR_STATE: the session plays a
+ * recording, which has the scales. */
 HAP_NODISCARD HAP_API hap_status hap_session_set_time_scale(hap_session *session, double scale);
 
 /* [any] Clears a latched fault. From the next tick on force is felt again, over 20 ms. Where the

@@ -69,7 +69,7 @@ bool hapi_tool_look(hapi_nearby *nearby, const hapi_tool_at *at, uint32_t found)
 void hapi_tool_join(hapi_nearby *nearby, uint32_t count);
 /* The same of the first hits of the model. */
 void hapi_tool_join_hits(hapi_nearby *nearby, uint32_t count);
-/* What a hull at a place [m] may meet: within the reach, and on its way back to where it touched. */
+/* What a hull at a place [m] may meet: within the reach, and on its way back to its touch. */
 typedef struct hapi_tool_box {
   dGeomID geom;
   const double *at;
