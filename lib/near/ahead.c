@@ -146,6 +146,15 @@ static bool island_add(hapi_nearby *nearby, uint32_t known)
   return true;
 }
 
+/* A body that was gathered and is not of the island belongs to a mechanism without room. */
+static bool island_add_met(hapi_nearby *nearby, uint32_t known)
+{
+  const hapi_visit *visit = &nearby->visits[known];
+  bool refused =
+      visit->gathered_in == nearby->range.number && visit->island_in != nearby->range.number;
+  return !refused && island_add(nearby, known);
+}
+
 static bool island_add_mechanism(hapi_nearby *nearby, uint32_t known)
 {
   const hapi_mechanism *mechanism = &nearby->range.mechanism;
@@ -176,7 +185,7 @@ static bool island_add_links(hapi_nearby *nearby, uint32_t known, hapi_range_nee
     }
     uint32_t other = hapi_bodies_find(&nearby->world->bodies, body);
     HAPI_ASSERT_INDEX(other, nearby->world->bodies.high); /* can_own has asked for it */
-    if (body_is_done(nearby, other) || !island_add(nearby, other)) {
+    if (body_is_done(nearby, other) || !island_add_met(nearby, other)) {
       return false;
     }
   }
@@ -213,7 +222,7 @@ static bool island_fits(hapi_nearby *nearby, uint32_t known)
   hapi_range_need need = {0, 0, 0};
   uint32_t joints_before = range->mechanism.joint_count;
   nearby->range.ahead.island_count = nearby->range.ahead.half_pairs = 0;
-  bool fits = island_add(nearby, known);
+  bool fits = island_add_met(nearby, known);
   for (uint32_t i = 0; fits && i < nearby->range.ahead.island_count; ++i) {
     fits = island_add_mechanism(nearby, nearby->range.ahead.island[i]) &&
            island_add_links(nearby, nearby->range.ahead.island[i], &need) && tick_has_room(nearby);

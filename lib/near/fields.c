@@ -214,7 +214,7 @@ static uint32_t field_near(hapi_nearby *nearby, dGeomID geom, const double box[6
   hapi_meshes *meshes = &nearby->meshes;
   field_grid grid;
   field_patch patch = {.grid = &grid, .heights = meshes->heights};
-  double local[6];
+  double local[6] = {0.0};
   uint32_t found = 0;
   for (int i = 0; i < 8; ++i) { /* a box of the field's frame that holds it */
     dVector3 at;
