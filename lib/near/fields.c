@@ -18,7 +18,7 @@
  * depth are in the field's box as well, a field has a whole number of cells, and all triangles that
  * meet at a corner must give it the same height. The field's triangles are unknown then. */
 
-#define CELLS_MOST (HAPI_NEAR_TRIANGLES / 2) /* that are looked at */
+#define CELLS_MOST (0.5 * HAPI_NEAR_TRIANGLES) /* that are looked at */
 #define FAR_CELL 1e9
 #define SAME 1e-9     /* of a length */
 #define HIGH_MOST 1e5 /* m: of heights that a callback gives, and that have no bounds */

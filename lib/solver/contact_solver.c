@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "solver/contact_solver.h"
 
+#include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
@@ -399,7 +400,7 @@ static void way_go_on(hapi_solver *solver, sweep_way *way)
     way->d[i] = d;
     size2 += d * d * row->response;
   }
-  bool ahead = size2 <= way->size2 && way->size2 > 0.0;
+  bool ahead = size2 <= way->size2 && way->size2 > 0.0 && way->size2 < HUGE_VAL;
   double share = ahead ? size2 / way->size2 : 0.0;
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     double more = ahead ? share * way->p[i] : 0.0;
