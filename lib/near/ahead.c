@@ -243,7 +243,9 @@ static void ahead_walk(hapi_nearby *nearby)
     return;
   }
   comers_collect(nearby);
-  qsort(ahead->comers, ahead->count, sizeof *ahead->comers, comer_by_arrival);
+  if (ahead->count > 0) { /* else there may be no memory, which qsort may not be given */
+    qsort(ahead->comers, ahead->count, sizeof *ahead->comers, comer_by_arrival);
+  }
   range->hops = 0;
   for (uint32_t i = 0; i < ahead->count; ++i) {
     uint32_t known = ahead->comers[i].known;
