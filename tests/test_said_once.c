@@ -1,0 +1,92 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Warnings about what the session cannot keep up with: once each, and none where it can. */
+
+#include "tests/tap.h"
+
+#include <stdatomic.h>
+
+#include <hapode/hooks.h>
+
+#include "tests/contact_world.h"
+#include "tests/stage.h"
+
+#define EDGE 0.05
+#define RADIUS 0.01
+
+static atomic_int late_lines;
+static atomic_int unsolved_lines;
+
+static void count_lines(hap_log_level level, const char *text, void *user)
+{
+  (void)user;
+  if (level >= HAP_LOG_WARNING) {
+    atomic_fetch_add(&late_lines, strstr(text, "takes longer than its period") != NULL);
+    atomic_fetch_add(&unsolved_lines, strstr(text, "than a tick can solve") != NULL);
+  }
+}
+
+static void count_begin(void)
+{
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.log = count_lines;
+  atomic_store(&late_lines, 0);
+  atomic_store(&unsolved_lines, 0);
+  CHECK(hap_hooks_set(&hooks) == HAP_OK);
+}
+
+/* ---- physics ---- */
+
+static void sleep_long(stage *s)
+{
+  (void)s;
+  sleep_ms(30); /* of a period of 20 */
+}
+
+static int lines_of_physics(void (*in_step)(stage *s))
+{
+  stage s;
+  count_begin();
+  stage_init(&s, HAP_DRIVE_THREADS);
+  s.in_step = in_step;
+  s.session = session_make(&s.def, &s.ode);
+  session_run(s.session);
+  sleep_ms(2000);
+  stage_end(&s);
+  CHECK(hap_hooks_set(NULL) == HAP_OK);
+  return atomic_load(&late_lines);
+}
+
+TEST(a_world_beyond_real_time_is_said_once)
+{
+  CHECK(lines_of_physics(sleep_long) == 1);
+  CHECK(lines_of_physics(NULL) == 0);
+}
+
+/* ---- ticks ---- */
+
+static int lines_of_row(int count)
+{
+  count_begin();
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  for (int i = 0; i < count; ++i) {
+    cw_add_cube(w, 0.15, EDGE, EDGE * i, 0.0, 0.5 * EDGE);
+  }
+  w->def.accuracy = 0.0;
+  w->hand_def.radius = RADIUS;
+  w->hand_velocity[0] = 0.2;
+  cw_start(w, -0.5 * EDGE - RADIUS, 0.0, 0.5 * EDGE);
+  cw_run(w, 1000);
+  printf("# %d cubes: residual %g m/s\n", count, cw_stats(w).contact.residual_max);
+  CHECK(hap_hooks_set(NULL) == HAP_OK);
+  return atomic_load(&unsolved_lines);
+}
+
+TEST(ticks_that_stay_unsolved_are_said_once)
+{
+  CHECK(lines_of_row(100) == 1);
+  CHECK(lines_of_row(3) == 0);
+}
