@@ -45,6 +45,7 @@ typedef struct recorded_setup {
   hap_coupling coupling; /* with a spring; else as the rig has it */
   double coupling_stiffness;
   double virtual_mass;
+  double time_scale; /* from the start on; 0: 1 */
 } recorded_setup;
 
 static inline recorded_setup recorded_setup_of(const char *scene_name, hap_model model, int ms)
@@ -96,6 +97,9 @@ static inline hap_stats recorded_run(const recorded_setup *s, rig *r)
 {
   hap_stats stats;
   memset(&stats, 0, sizeof stats);
+  if (s->time_scale > 0.0) {
+    CHECK(hap_session_set_time_scale(r->session, s->time_scale) == HAP_OK);
+  }
   CHECK(hap_session_start(r->session) >= HAP_OK);
   for (int look = 0; look * 50 < s->ms || (stats.loop.ticks < s->ticks && look < 400); ++look) {
     sleep_ms(50);

@@ -441,6 +441,19 @@ TEST(changes_of_time)
   (void)check_setup(&s);
 }
 
+static void ramp_time(rig *r, int look)
+{
+  CHECK(hap_session_set_time_scale(r->session, 0.2 + 0.05 * (look % 16)) == HAP_OK);
+}
+
+TEST(slow_from_the_start)
+{
+  recorded_setup s = recorded_setup_of("stack", HAP_MODEL_CONTACT, 900);
+  s.time_scale = 0.2;
+  s.meanwhile = ramp_time;
+  (void)check_setup(&s);
+}
+
 static hap_pointer_id guest;
 
 static void make_trouble(rig *r, int look)

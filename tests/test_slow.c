@@ -187,6 +187,85 @@ TEST(pressed_block_stays)
   }
 }
 
+/* A scale that changes all the time: bodies near and far from the hand go the same way, and as far
+ * as the scales of the steps say. */
+TEST(ramps_of_time_carry_near_and_far_alike)
+{
+  contact_world *w = slow_new(0.0, 0.0);
+  const double speed = 0.4;
+  dBodyID near = cw_add_cube(w, 0.1, 0.04, 0.035, -0.2, 0.0);
+  dBodyID far = cw_add_cube(w, 0.1, 0.04, 3.0, -0.2, 0.0);
+  dBodySetLinearVel(near, 0.0, speed, 0.0);
+  dBodySetLinearVel(far, 0.0, speed, 0.0);
+  cw_start(w, 0.0, 0.0, 0.0);
+  double own_time = 0.0;
+  for (int k = 0; k < 1001; ++k) {
+    double scale = 0.55 + 0.45 * cos(0.006 * k);
+    slow_set(w, scale);
+    cw_tick(w);
+    own_time += 1e-3 * scale;
+  }
+  /* two steps may pass before a scale is in force */
+  CHECK_NEAR(dBodyGetPosition(far)[1], -0.2 + speed * own_time, speed * 0.04);
+  CHECK_NEAR(dBodyGetPosition(near)[1], dBodyGetPosition(far)[1], 1e-3 * speed);
+  CHECK_NEAR(dBodyGetLinearVel(near)[1], speed, 1e-6);
+}
+
+/* A joint that the loop does not know is measured, in the world's steps. */
+TEST(measured_joints_go_by_the_time_of_bodies)
+{
+  double fell[2];
+  for (int i = 0; i < 2; ++i) {
+    double scale = i == 0 ? 1.0 : 0.25;
+    contact_world *w = slow_new(9.81, 0.0);
+    w->def.physics_hz = i == 0 ? 200.0 : 50.0; /* steps as long for the bodies */
+    cw_add_box(w, 0.3, (const double[3]){0.2, 0.04, 0.02}, 0.1, 0.0, 0.0);
+    dJointID joint = dJointCreateDHinge(w->world, NULL);
+    cw_add_box(w, 0.3, (const double[3]){0.2, 0.04, 0.02}, 0.32, 0.0, 0.0);
+    dJointAttach(joint, w->bodies[0], w->bodies[1]);
+    dJointSetDHingeAxis(joint, 0.0, 1.0, 0.0);
+    dJointSetDHingeAnchor1(joint, 0.18, 0.0, 0.0);
+    dJointSetDHingeAnchor2(joint, 0.26, 0.0, 0.0);
+    dJointID held = dJointCreateHinge(w->world, NULL);
+    dJointAttach(held, w->bodies[0], NULL);
+    dJointSetHingeAnchor(held, 0.0, 0.0, 0.0);
+    dJointSetHingeAxis(held, 0.0, 1.0, 0.0);
+    slow_start(w, scale, 0.1, 0.0, 0.01 + RADIUS + 0.002);
+    cw_run(w, (int)(160.0 / scale) + 1);
+    fell[i] = -dBodyGetPosition(w->bodies[1])[2];
+    CHECK(cw_stats(w).faults.count == 0);
+    cw_close(w);
+  }
+  printf("# fell by %.4f and %.4f m\n", fell[0], fell[1]);
+  CHECK(fell[0] > 0.05);
+  CHECK_NEAR(fell[1], fell[0], 0.03 * fell[0]);
+}
+
+/* What comes by itself from outside of the hand's reach comes when its own time says so, and hits
+ * as hard. */
+TEST(what_comes_by_itself_comes_in_its_own_time)
+{
+  double peak[SCALES];
+  for (int i = 0; i < SCALES; ++i) {
+    contact_world *w = slow_new(9.81, 0.0);
+    const double drop = 0.5;
+    double first = 0.0;
+    cw_add_cube(w, 0.2, 0.06, 0.0, 0.0, drop + 0.03 + RADIUS);
+    slow_start(w, scales[i], 0.0, 0.0, 0.0);
+    peak[i] = 0.0;
+    for (int k = 1; k < 6000; ++k) {
+      cw_tick(w);
+      if (first == 0.0 && w->force[2] < 0.0) {
+        first = 1e-3 * k;
+      }
+      peak[i] = fmax(peak[i], -w->force[2]);
+    }
+    CHECK_NEAR(first * scales[i], sqrt(2.0 * drop / 9.81), 0.005);
+    CHECK_NEAR(peak[i], peak[0], 0.02 * peak[0]);
+    cw_close(w);
+  }
+}
+
 TEST(time_scales_are_checked)
 {
   contact_world *w = slow_new(0.0, 0.0);
