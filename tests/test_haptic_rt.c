@@ -398,7 +398,7 @@ TEST(a_contact_that_arrives_deep_ramps_from_zero)
   begin_model();
   (void)add_contact(0, HAPI_SLOT_NONE, 0);
   model_adopt();
-  int ticks = (int)lround(HAPI_RAMP_S / T);
+  int ticks = (int)lround(HAPI_SAFETY_CONTACT_RAMP_S / T);
   for (int i = 0; i <= ticks + 5; ++i) {
     if (i == ticks / 2) { /* a new model of the same contact goes on where it was */
       begin_model();

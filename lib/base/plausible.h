@@ -6,14 +6,13 @@
 #include <math.h>
 #include <stdbool.h>
 
-/* Beyond this a coordinate [m] or speed [m/s, rad/s] is taken for an error. */
-#define HAPI_STATE_LIMIT 1e6
+#include "base/safety.h"
 
-/* False for NaN. */
+/* Beyond the limit a coordinate [m] or speed [m/s, rad/s] is taken for an error. False for NaN. */
 static inline bool hapi_plausible(const double *values, int count)
 {
   for (int i = 0; i < count; ++i) {
-    if (!(fabs(values[i]) <= HAPI_STATE_LIMIT)) {
+    if (!(fabs(values[i]) <= HAPI_SAFETY_STATE_LIMIT)) {
       return false;
     }
   }

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/safety.h"
 #include "base/vec.h"
 #include "local/pointer_friction.h"
 
@@ -39,11 +40,7 @@
  * A torque is paid as a force is, for the turn that the device made; those of friction on a device
  * that does not turn a hull are left out: they are small beside its forces' work. */
 
-#define OVERDRAFT 0.006 /* what is held back comes a tick late and no faster than the slew limit */
-#define MOVED_LEAST 1e-24    /* m^2: less is rest, and its square may be no number to divide by */
-#define OVERDRAFT_LEAST 1e-5 /* J: 1 N along 10 um */
-#define REST_S 0.3           /* a touch that lasts longer is no tapping */
-#define DEBT_S 0.3           /* time constant with which a debt is then forgiven */
+#define MOVED_LEAST 1e-24 /* m^2: less is rest, and its square may be no number to divide by */
 
 static double world_per_device(const hapi_pointer *p)
 {
@@ -368,13 +365,15 @@ void hapi_energy_observe(hapi_guard *guard, const hapi_tick_facts *facts,
   guard->balance += given + bodies_lose(facts, bodies, &stored) +
                     surfaces_give(facts, pointers, bodies, touches, &stored);
   guard->stored_max = hapi_max(stored, guard->stored_max);
-  double overdraft = hapi_max(OVERDRAFT * guard->stored_max, OVERDRAFT_LEAST);
+  double overdraft =
+      hapi_max(HAPI_SAFETY_OVERDRAFT * guard->stored_max, HAPI_SAFETY_OVERDRAFT_LEAST);
   /* A debt that comes all at once, after a time without the loop or when something vanished that
    * had been pressed, cannot be paid back by a hand that rests: its force would come and go for
    * ever. So in a touch that lasts, the ledger comes back to what is in the springs. */
   guard->touch_s += facts->period;
-  if (guard->touch_s > REST_S && guard->balance < guard->sprung) {
-    guard->balance += (guard->sprung - guard->balance) * hapi_min(facts->period / DEBT_S, 1.0);
+  if (guard->touch_s > HAPI_SAFETY_DEBT_AFTER_S && guard->balance < guard->sprung) {
+    guard->balance +=
+        (guard->sprung - guard->balance) * hapi_min(facts->period / HAPI_SAFETY_DEBT_S, 1.0);
   }
   pay_no_more_than(pointers, guard->balance + overdraft);
 }

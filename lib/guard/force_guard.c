@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/safety.h"
 #include "base/vec.h"
 #include "pointer/coupling.h"
 
@@ -14,11 +15,6 @@
  *
  * Slew before saturation holds both bounds: the force before lies within its limit, and shortening
  * is the projection onto a ball, which brings no two points farther apart. */
-
-#define RAMP_IN_S 0.02
-#define FADE_S 0.1     /* from full force to none with an old local model; longest after a fault */
-#define AGE_LEAST 0.01 /* s, an age that is always good: model SINGLE at 1 kHz renews every ms */
-#define WRENCH_LIMIT 1e12 /* N, N m: beyond it is an error, and its square could overflow */
 
 void hapi_fault_set(hapi_fault_latch *latch, hap_fault fault, uint32_t pointer, uint32_t generation)
 {
@@ -52,8 +48,8 @@ void hapi_guard_cut(hapi_pointer *pointer)
 
 static bool vector_is_usable(const double v[3])
 {
-  return fabs(v[0]) <= WRENCH_LIMIT && fabs(v[1]) <= WRENCH_LIMIT &&
-         fabs(v[2]) <= WRENCH_LIMIT; /* false for NaN */
+  return fabs(v[0]) <= HAPI_SAFETY_WRENCH_LIMIT && fabs(v[1]) <= HAPI_SAFETY_WRENCH_LIMIT &&
+         fabs(v[2]) <= HAPI_SAFETY_WRENCH_LIMIT; /* false for NaN */
 }
 
 /* A sum of squares within the limit says so of each; only what is far out is looked at one by
@@ -61,7 +57,7 @@ static bool vector_is_usable(const double v[3])
 static inline bool wrench_is_usable(const hap_wrench *w)
 {
   return hapi_v3_dot(w->force, w->force) + hapi_v3_dot(w->torque, w->torque) <=
-             WRENCH_LIMIT * WRENCH_LIMIT ||
+             HAPI_SAFETY_WRENCH_LIMIT * HAPI_SAFETY_WRENCH_LIMIT ||
          (vector_is_usable(w->force) && vector_is_usable(w->torque));
 }
 
@@ -72,12 +68,15 @@ static void follow_age(hapi_guard *guard, const hapi_tick_facts *facts)
   double step = facts->physics_period;
   int64_t newest = facts->sent_ns > facts->state_ns ? facts->sent_ns : facts->state_ns;
   double age = 1e-9 * (double)(facts->now_ns - newest);
-  double limit = (2.0 * step > AGE_LEAST ? 2.0 * step : AGE_LEAST) + facts->period;
+  double limit =
+      (2.0 * step > HAPI_SAFETY_AGE_LEAST_S ? 2.0 * step : HAPI_SAFETY_AGE_LEAST_S) + facts->period;
   bool stale = facts->model_number != 0 && step > 0.0 && age > limit;
   guard->stale_times += stale && !guard->stale;
   guard->stale_ticks += stale;
   guard->stale = stale;
-  double change = stale ? facts->period / FADE_S : step > 0.0 ? -facts->period / step : 0.0;
+  double change = stale        ? facts->period / HAPI_SAFETY_FADE_S
+                  : step > 0.0 ? -facts->period / step
+                               : 0.0;
   guard->age_loss = hapi_min(hapi_max(guard->age_loss + change, 0.0), 1.0);
 }
 
@@ -96,7 +95,7 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
   if (guard->mode == HAP_GUARD_MEASURE) {
     return;
   }
-  g->share = hapi_min(g->share + period / RAMP_IN_S, 1.0);
+  g->share = hapi_min(g->share + period / HAPI_SAFETY_RAMP_IN_S, 1.0);
   double share = g->share * (1.0 - guard->age_loss);
   g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;
   g->flags |= guard->age_loss > 0.0 ? HAP_GUARD_STALE : 0;
@@ -134,11 +133,11 @@ static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
   const hapi_guard_pointer *g = &p->guard;
   bool fault = guard->latch.fault != HAP_FAULT_NONE;
   double force_rate =
-      fault ? hapi_max(p->device.limits.slew_force, p->device.limits.max_force / FADE_S)
+      fault ? hapi_max(p->device.limits.slew_force, p->device.limits.max_force / HAPI_SAFETY_FADE_S)
             : p->device.limits.slew_force;
-  double torque_rate =
-      fault ? hapi_max(p->device.limits.slew_torque, p->device.limits.max_torque / FADE_S)
-            : p->device.limits.slew_torque;
+  double torque_rate = fault ? hapi_max(p->device.limits.slew_torque,
+                                        p->device.limits.max_torque / HAPI_SAFETY_FADE_S)
+                             : p->device.limits.slew_torque;
   bool force = vector_slew(g->written.force, period * force_rate, p->device.wrench.force);
   bool torque = vector_slew(g->written.torque, period * torque_rate, p->device.wrench.torque);
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;

@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/safety.h"
 #include "base/vec.h"
 #include "device/device.h"
 #include "device/emergency.h"
@@ -13,10 +14,8 @@
 #include "haptic/haptic_internal.h"
 #include "pointer/coupling.h"
 
-#define SPEED_LIMIT 10.0 /* m/s at the device: about twice what an arm makes */
-#define GRIP_MOST 0.05   /* m, at the device: arm that a handle has against turning */
-#define BALL_INERTIA 0.4 /* m r^2 */
-#define SLEW_S 0.002     /* from no force to all of it, where the application says nothing else */
+#define GRIP_MOST 0.05            /* m, at the device: arm that a handle has against turning */
+#define BALL_INERTIA 0.4          /* m r^2 */
 #define WORLD_STIFFNESS_MOST 1e15 /* N/m, of a proxy: beyond it rounding of positions is felt */
 
 /* ---- the loop's side ---- */
@@ -106,12 +105,12 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   p->device.estimates =
       def->velocity == HAP_VELOCITY_ESTIMATED ||
       (def->velocity == HAP_VELOCITY_AUTO && info->quantum > 0.0 && info->measures_velocity == 0);
-  p->device.speed_limit = slot->has_device ? SPEED_LIMIT : 0.0;
+  p->device.speed_limit = slot->has_device ? HAPI_SAFETY_SPEED_LIMIT : 0.0;
   hapi_velocity_reset(&p->velocity, info->quantum);
   set_coupling(haptic, slot, p);
   set_spin_coupling(slot, p);
   p->device.limits.slew_force =
-      def->max_slew > 0.0 ? def->max_slew : p->device.limits.max_force / SLEW_S;
+      def->max_slew > 0.0 ? def->max_slew : p->device.limits.max_force / HAPI_SAFETY_SLEW_S;
   p->device.limits.slew_torque =
       p->device.limits.max_torque * (p->device.limits.slew_force / p->device.limits.max_force);
   p->device.pose.quat_wxyz[0] = 1.0;

@@ -55,7 +55,7 @@ static inline bool hapi_body_sound(const hap_twist *twist, const double position
   for (int i = 0; i < 3; ++i) {
     sum += fabs(twist->linear[i]) + fabs(twist->angular[i]) + fabs(position[i]);
   }
-  return sum <= 9.0 * HAPI_STATE_LIMIT; /* false for NaN */
+  return sum <= 9.0 * HAPI_SAFETY_STATE_LIMIT; /* false for NaN */
 }
 
 /* A state that is not finite stays here: the body stops where it last was and the guard latches. */

@@ -3,20 +3,14 @@
 #ifndef HAPODE_LOCAL_CONTACT_RAMP_H
 #define HAPODE_LOCAL_CONTACT_RAMP_H
 
+#include "base/safety.h"
 #include "base/vec.h"
 #include "local/touch.h"
 #include "pointer/pointer.h"
 
-/* A contact that is already deep when it arrives gets its full force after this time. */
-#define HAPI_RAMP_S 0.02
-
-/* What it is deeper than this does not count at once but comes in at this speed: a spring of 1 kN/m
- * that begins 0.5 m deep would hold 125 J, and throw 1 kg away at 16 m/s. */
-#define HAPI_RAMP_DEPTH 0.01 /* m */
-#define HAPI_RAMP_SPEED 0.2  /* m/s */
-
-/* A contact that is pressed in faster was not pressed in: one of the two was put where it is. */
-#define HAPI_PRESS_SPEED 10.0 /* m/s */
+/* A contact that is already deep when it arrives gets its full force over CONTACT_RAMP_S. What it
+ * is deeper than CONTACT_DEPTH comes in at CONTACT_SPEED. A contact that is pressed in faster than
+ * at CONTACT_PRESS_MOST was not pressed in: one of the two was put where it is. */
 
 /* Where a device jumped, none of the depth counts: nobody put in the energy that it stands for. The
  * surface is where the device is, goes back with it, and does not come after it. */
@@ -24,7 +18,7 @@ static inline void hapi_contact_ramp_begin(hapi_ramp *r, double depth, bool jump
 {
   bool deep = depth > 0.0;
   *r = (hapi_ramp){.share = deep && !jumped ? 0.0 : 1.0,
-                   .excess = hapi_max(depth - (jumped ? 0.0 : HAPI_RAMP_DEPTH), 0.0),
+                   .excess = hapi_max(depth - (jumped ? 0.0 : HAPI_SAFETY_CONTACT_DEPTH), 0.0),
                    .held = deep && jumped};
 }
 
@@ -35,13 +29,13 @@ static inline double hapi_ramp_follow(hapi_ramp *r, bool *io_seen, const hapi_po
                                       double *io_depth, double period)
 {
   double depth = *io_depth;
-  double most = hapi_max(HAPI_PRESS_SPEED * period, HAPI_RAMP_DEPTH);
+  double most = hapi_max(HAPI_SAFETY_CONTACT_PRESS_MOST * period, HAPI_SAFETY_CONTACT_DEPTH);
   if (!*io_seen || depth - hapi_max(r->depth, 0.0) > most) {
     hapi_contact_ramp_begin(r, depth, p->device.jump_s > 0.0);
     *io_seen = true;
   } else if (r->share < 1.0 || r->excess > 0.0) {
-    double comes_in = r->held ? 0.0 : HAPI_RAMP_SPEED * period;
-    r->share = depth > 0.0 ? hapi_min(r->share + period / HAPI_RAMP_S, 1.0) : 1.0;
+    double comes_in = r->held ? 0.0 : HAPI_SAFETY_CONTACT_SPEED * period;
+    r->share = depth > 0.0 ? hapi_min(r->share + period / HAPI_SAFETY_CONTACT_RAMP_S, 1.0) : 1.0;
     r->excess = hapi_max(hapi_min(r->excess, depth) - comes_in, 0.0);
   }
   r->depth = depth;

@@ -21,7 +21,7 @@
 #define RIGID_SLACK 1e-4 /* m: bodies gain speed within the tick */
 
 /* m/s: no hand comes from farther in a tick; what does was put there, and has no side. */
-#define CROSS_SPEED HAPI_PRESS_SPEED
+#define CROSS_SPEED HAPI_SAFETY_CONTACT_PRESS_MOST
 
 /* From the body's frame to the world. */
 static void nearest_to_world(const hapi_local_body *body, hapi_nearest *io)

@@ -179,7 +179,7 @@ static bool pair_leaps(const hapi_tool_pair *pair, const hapi_pointer *p, const 
   hapi_v3_sub(at->position, pair->at.position, way);
   hapi_quat_multiply(at->quat_wxyz, back, turn);
   double most = hapi_v3_norm(way) + 2.0 * p->shape.extent * hapi_v3_norm(turn + 1);
-  return p->device.jumped || (pair->placed && most > HAPI_PRESS_SPEED * period);
+  return p->device.jumped || (pair->placed && most > HAPI_SAFETY_CONTACT_PRESS_MOST * period);
 }
 
 /* The way out of the geom, by all points that were found last. */

@@ -3,6 +3,7 @@
 #include "pointer/coupling.h"
 
 #include "base/plausible.h"
+#include "base/safety.h"
 #include "base/vec.h"
 #include "pointer/proxy.h"
 
@@ -12,9 +13,6 @@
  * A device that is farther from where it was at the last tick than a hand can move it in a tick has
  * jumped: an encoder slipped, or the loop did not run for some time. The contacts that are deep by
  * it begin anew (contact_ramp.h), also those that come with the next models. */
-
-#define SPIN_MOST 100.0 /* rad/s, of a hand: about three times what a wrist makes */
-#define JUMP_S 0.01     /* and two steps of physics: a model for the new place has come */
 
 /* A sphere has torque of friction alone, and only on a device that turns it. */
 void hapi_pointer_feel(hapi_pointer *p, hap_effect_wish wish, bool rubs)
@@ -101,7 +99,8 @@ static bool pointer_jumps(const hapi_pointer *p, double period)
   hapi_v3_sub(p->device.pose.position, p->device.good.position, way);
   return hapi_v3_norm(way) > p->device.speed_limit * period ||
          (p->shape.hull != NULL && !p->device.three_dof &&
-          turn_between(p->device.pose.quat_wxyz, p->device.good.quat_wxyz) > SPIN_MOST * period);
+          turn_between(p->device.pose.quat_wxyz, p->device.good.quat_wxyz) >
+              HAPI_SAFETY_SPIN_LIMIT * period);
 }
 
 /* A velocity that is a difference of such positions would be felt through every damper. */
@@ -113,8 +112,8 @@ static void pointer_check_speed(hapi_pointer *p)
       (p->device.speed_limit > 0.0 && hapi_v3_norm(v) > p->device.speed_limit)) {
     hapi_v3_set(v, 0.0, 0.0, 0.0);
   }
-  if (p->shape.hull != NULL &&
-      (p->device.jumped || (p->device.speed_limit > 0.0 && hapi_v3_norm(w) > SPIN_MOST))) {
+  if (p->shape.hull != NULL && (p->device.jumped || (p->device.speed_limit > 0.0 &&
+                                                     hapi_v3_norm(w) > HAPI_SAFETY_SPIN_LIMIT))) {
     hapi_v3_set(w, 0.0, 0.0, 0.0);
   }
 }
@@ -129,7 +128,7 @@ static bool input_is_plausible(const hapi_pointer *p)
   const double *w = p->device.twist.angular;
   double sum = hapi_v3_dot(at, at) + q[0] * q[0] + hapi_v3_dot(q + 1, q + 1) + hapi_v3_dot(v, v) +
                hapi_v3_dot(w, w);
-  return sum <= HAPI_STATE_LIMIT * HAPI_STATE_LIMIT ||
+  return sum <= HAPI_SAFETY_STATE_LIMIT * HAPI_SAFETY_STATE_LIMIT ||
          (hapi_plausible(at, 3) && hapi_plausible(q, 4) && hapi_plausible(v, 3) &&
           hapi_plausible(w, 3));
 }
@@ -144,7 +143,8 @@ uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double
     }
     bool good = input_is_plausible(p);
     p->device.jumped = good && pointer_jumps(p, period);
-    p->device.jump_s = p->device.jumped ? JUMP_S + 2.0 * physics_period : p->device.jump_s - period;
+    p->device.jump_s =
+        p->device.jumped ? HAPI_SAFETY_JUMP_S + 2.0 * physics_period : p->device.jump_s - period;
     pointer_check_speed(p);
     if (!good || !pointer_place(p)) {
       unusable = unusable == 0 ? i + 1 : unusable;

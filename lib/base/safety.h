@@ -1,0 +1,36 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BASE_SAFETY_H
+#define HAPODE_BASE_SAFETY_H
+
+/* The safety constants: numbers that decide how much force a hand gets, and for how long. Reasons
+ * are in the table of docs/safety.md. A test compares the table with this file: name, value, unit.
+ *
+ * Here and not in lib/guard, as the pointer, the contacts and the plugins have some of them. */
+
+/* ---- a plausible device ---- */
+#define HAPI_SAFETY_SPEED_LIMIT 10.0  /* m/s */
+#define HAPI_SAFETY_SPIN_LIMIT 100.0  /* rad/s */
+#define HAPI_SAFETY_JUMP_S 0.01       /* s */
+#define HAPI_SAFETY_STATE_LIMIT 1e6   /* m, m/s, rad/s */
+#define HAPI_SAFETY_WRENCH_LIMIT 1e12 /* N, N m */
+
+/* ---- how fast force comes and goes ---- */
+#define HAPI_SAFETY_SLEW_S 0.002     /* s */
+#define HAPI_SAFETY_RAMP_IN_S 0.02   /* s */
+#define HAPI_SAFETY_FADE_S 0.1       /* s */
+#define HAPI_SAFETY_AGE_LEAST_S 0.01 /* s */
+
+/* ---- contacts that arrive deep ---- */
+#define HAPI_SAFETY_CONTACT_RAMP_S 0.02     /* s */
+#define HAPI_SAFETY_CONTACT_DEPTH 0.01      /* m */
+#define HAPI_SAFETY_CONTACT_SPEED 0.2       /* m/s */
+#define HAPI_SAFETY_CONTACT_PRESS_MOST 10.0 /* m/s */
+
+/* ---- energy ---- */
+#define HAPI_SAFETY_OVERDRAFT 0.006      /* 1 */
+#define HAPI_SAFETY_OVERDRAFT_LEAST 1e-5 /* J */
+#define HAPI_SAFETY_DEBT_AFTER_S 0.3     /* s */
+#define HAPI_SAFETY_DEBT_S 0.3           /* s */
+
+#endif
