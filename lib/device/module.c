@@ -4,7 +4,6 @@
 
 #include <dlfcn.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <link.h>
 #include <stdbool.h>
 #include <string.h>
@@ -14,9 +13,10 @@
 #include "base/alloc.h"
 #include "base/log.h"
 #include "device/device.h"
+#include "device/module_file.h"
 
 /* The loaded code drives motors, so it must be the named file and no other: a whole path, no search
- * through LD_LIBRARY_PATH or the working folder.
+ * through LD_LIBRARY_PATH or the working folder, and nobody else may have put it there.
  *
  * Each device holds the library once, and the system's loader counts: the code goes with the last
  * device. By then no thread runs in it: ops->close has returned, and hapi_emergency_remove has
@@ -112,31 +112,33 @@ static hap_status check_header(const module *m, const elf_header *header, uint64
   return HAP_OK;
 }
 
-/* O_NONBLOCK: opening a pipe would wait for its other end. */
-static hap_status check_file(const module *m)
+static hap_status check_file(const module *m, int file)
 {
   struct stat about;
   elf_header header;
-  int file = open(m->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (file < 0) {
-    return module_fail(m, errno == ENOENT ? HAP_ERROR_NOT_FOUND : HAP_ERROR_IO,
-                       "cannot be opened: ", strerror(errno));
-  }
-  bool regular = fstat(file, &about) == 0 && S_ISREG(about.st_mode);
   memset(&header, 0, sizeof header);
-  ssize_t got = regular ? read(file, &header, sizeof header) : 0;
-  int cause = errno;
-  close(file);
-  if (!regular) {
-    return module_fail(m, HAP_ERROR_IO, "not a file but a folder, a pipe or a device", "");
-  }
-  if (got < 0) {
-    return module_fail(m, HAP_ERROR_IO, "cannot be read: ", strerror(cause));
+  if (fstat(file, &about) != 0 || pread(file, &header, sizeof header, 0) < 0) {
+    return module_fail(m, HAP_ERROR_IO, "cannot be read: ", strerror(errno));
   }
   return check_header(m, &header, (uint64_t)about.st_size);
 }
 
 /* ---- loading ---- */
+
+/* Without the file's name by which it was loaded. */
+static const char *load_cause(const char *name)
+{
+  const char *cause = dlerror();
+  if (cause == NULL) {
+    return "no reason given";
+  }
+  const char *at = strstr(cause, name);
+  if (at == cause) {
+    at += strlen(name);
+    return at + strspn(at, ": ");
+  }
+  return cause;
+}
 
 static hap_status table_find(const module *m, const hap_device_ops **out)
 {
@@ -159,17 +161,29 @@ static hap_status table_find(const module *m, const hap_device_ops **out)
   return HAP_OK;
 }
 
+/* What is loaded is the file that was checked: the path is looked up once. */
+static hap_status module_load(module *m)
+{
+  char name[HAPI_MODULE_LOAD_PATH];
+  int file = -1;
+  HAPI_TRY(hapi_module_file_open(m->path, &file, m->detail));
+  hap_status status = check_file(m, file);
+  if (status == HAP_OK) {
+    hapi_module_file_name(file, name, sizeof name);
+    m->library = dlopen(name, RTLD_NOW | RTLD_LOCAL);
+    if (m->library == NULL) {
+      status = module_fail(m, HAP_ERROR_IO, "cannot be loaded: ", load_cause(name));
+    }
+  }
+  close(file);
+  return status;
+}
+
 static hap_status module_open(module *m, const char *args, hap_device **out)
 {
   const hap_device_ops *ops = NULL;
   hap_detail why = {""};
-  HAPI_TRY(check_file(m));
-  m->library = dlopen(m->path, RTLD_NOW | RTLD_LOCAL);
-  if (m->library == NULL) {
-    const char *cause = dlerror();
-    return module_fail(m, HAP_ERROR_IO,
-                       "cannot be loaded: ", cause != NULL ? cause : "no reason given");
-  }
+  HAPI_TRY(module_load(m));
   hap_status status = table_find(m, &ops);
   if (status >= 0) {
     status = hapi_device_open_ops(ops, args, out, &why);
