@@ -15,6 +15,7 @@
 
 #include <ode/ode.h>
 
+#include "base/regular.h"
 #include "bench/accuracy.h"
 
 #define TABLE_GROWTH 256
@@ -202,7 +203,8 @@ static const char first_line[] = "# hapode-bench accuracy: finished rows\n";
 static bool hash_file(const char *path, uint64_t *io)
 {
   unsigned char block[65536];
-  FILE *file = fopen(path, "rb");
+  const char *why = NULL;
+  FILE *file = hapi_regular_open(path, &why);
   size_t got = 0;
   if (file == NULL) {
     return false;
@@ -373,9 +375,10 @@ static hap_status read_rows(bench *b, const char *path, FILE *file, const accura
 
 static hap_status accuracy_rows_head(bench *b, const char *path, accuracy_identity *out)
 {
-  FILE *file = fopen(path, "r");
+  const char *why = NULL;
+  FILE *file = hapi_regular_open(path, &why);
   if (file == NULL) {
-    return bench_fail(b, HAP_ERROR_IO, "%s: %s", path, strerror(errno));
+    return bench_fail(b, HAP_ERROR_IO, "%s: %s", path, why);
   }
   bool good = read_head(file, out);
   fclose(file);
@@ -390,9 +393,10 @@ hap_status accuracy_rows_read(bench *b, const char *path, const accuracy_plan *p
                               accuracy_row *rows)
 {
   accuracy_identity identity;
-  FILE *file = fopen(path, "r");
+  const char *why = NULL;
+  FILE *file = hapi_regular_open(path, &why);
   if (file == NULL) {
-    return bench_fail(b, HAP_ERROR_IO, "%s: %s", path, strerror(errno));
+    return bench_fail(b, HAP_ERROR_IO, "%s: %s", path, why);
   }
   hap_status status = read_head(file, &identity)
                           ? read_rows(b, path, file, plan, rows)

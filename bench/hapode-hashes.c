@@ -21,6 +21,7 @@
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 
+#include "base/regular.h"
 #include "bench/random_use.h"
 #include "bench/storm.h"
 #include "tools/run_recording.h"
@@ -641,7 +642,8 @@ static void usage_print(FILE *to)
 
 static char *file_read(const char *path)
 {
-  FILE *file = fopen(path, "rb");
+  const char *why = NULL;
+  FILE *file = hapi_regular_open(path, &why);
   char *text = NULL;
   size_t size = 0;
   size_t got = 1;

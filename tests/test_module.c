@@ -399,7 +399,8 @@ TEST(a_session_survives_what_a_device_does_wrong)
     const char *wrong;
     hap_fault fault;
   } cases[] = {{"none", HAP_FAULT_NONE},
-               {"odd_status", HAP_FAULT_NONE},
+               {"odd_status", HAP_FAULT_DEVICE_READ},
+               {"odd_write_status", HAP_FAULT_DEVICE_WRITE},
                {"pose_is_nan", HAP_FAULT_DEVICE_POSE},
                {"pose_is_far", HAP_FAULT_DEVICE_POSE},
                {"twist_is_nan", HAP_FAULT_DEVICE_POSE},

@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "base/number.h"
+#include "base/regular.h"
 #include "tools/spidar-emulator/emulator.h"
 
 #define WAKE_LEAST_S 20e-6
@@ -194,9 +195,10 @@ static bool load_script(program *p)
   if (p->script == NULL) {
     return true;
   }
-  FILE *file = fopen(p->script, "r");
+  const char *why = NULL;
+  FILE *file = hapi_regular_open(p->script, &why);
   if (file == NULL) {
-    fprintf(stderr, "spidar-emulator: %s: %s\n", p->script, strerror(errno));
+    fprintf(stderr, "spidar-emulator: %s: %s\n", p->script, why);
     return false;
   }
   while (good && fgets(line, sizeof line, file) != NULL) {

@@ -61,8 +61,9 @@ typedef struct hap_device_ops {
    * a device of dof 3 gives a constant one. Never blocks except with pacing DEVICE, never
    * allocates. HAP_ERROR_STATE before start and after stop.
    *
-   * After an error the outputs are not used, and the session latches a fault and calls zero. It
-   * goes on reading: a device that was unplugged may answer again, and is used again after
+   * After an error the outputs are not used, and the session latches a fault and calls zero. A
+   * positive number that is no hap_status counts as an error, for write too. The session goes on
+   * reading: a device that was unplugged may answer again, and is used again after
    * hap_session_reset_fault. start is called in between only by hap_pointer_restart. */
   hap_status (*read)(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
                      uint32_t *buttons);

@@ -9,6 +9,7 @@
 
 #include "base/assert.h"
 #include "base/log.h"
+#include "base/regular.h"
 
 #define LINE_SIZE 512
 
@@ -50,10 +51,10 @@ hap_status hapi_key_file_read(hapi_key_file *file, hapi_key_take take, void *sel
   char *value = NULL;
   hap_status status = HAP_OK;
   HAPI_ASSERT(file->path != NULL && take != NULL);
-  FILE *stream = fopen(file->path, "r");
+  const char *why = NULL;
+  FILE *stream = hapi_regular_open(file->path, &why);
   if (stream == NULL) {
-    return hapi_fail(file->detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", file->path,
-                     strerror(errno));
+    return hapi_fail(file->detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", file->path, why);
   }
   for (file->line = 1; fgets(text, sizeof text, stream) != NULL; ++file->line) {
     /* A line of more than the buffer, and one with a zero byte, have no line end where it should

@@ -34,6 +34,12 @@ HAP_NODISCARD hap_status hapi_device_open_ops(const hap_device_ops *ops, const c
 const hap_device_ops *hapi_device_ops(const hap_device *device);
 void *hapi_device_self(const hap_device *device);
 
+/* [any] Whether read or write did its work: a number that is no hap_status says nothing good. */
+static inline bool hapi_device_did(hap_status status)
+{
+  return status >= HAP_OK && status <= HAP_DIVERGED;
+}
+
 /* [any] Lives as long as the device. */
 const hap_device_info *hapi_device_info(const hap_device *device);
 

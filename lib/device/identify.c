@@ -110,7 +110,7 @@ static hap_status read_device(run *r)
   uint32_t buttons = 0;
   int64_t now_ns = await_tick(r);
   memset(&pose, 0, sizeof pose);
-  if (ops->read(r->device->self, now_ns, &pose, &twist, &buttons) < HAP_OK) {
+  if (!hapi_device_did(ops->read(r->device->self, now_ns, &pose, &twist, &buttons))) {
     return run_fail(r, "it cannot be read");
   }
   if (!hapi_finite(pose.position, 3)) {
@@ -182,7 +182,7 @@ static hap_status force_write(const run *r, double force)
   hap_wrench reached;
   wanted.force[r->axis] = force;
   if (hapi_emergencies() == r->emergencies &&
-      r->device->ops->write(r->device->self, &wanted, &reached) < HAP_OK) {
+      !hapi_device_did(r->device->ops->write(r->device->self, &wanted, &reached))) {
     return run_fail(r, "it takes no force");
   }
   return hapi_emergencies() == r->emergencies

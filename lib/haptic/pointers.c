@@ -216,7 +216,8 @@ static void fail_device(hapi_haptic *haptic, uint32_t index, hap_fault fault)
 static void ask_device(hapi_pointer_slot *slot, int64_t now_ns, hapi_pointer_input *io)
 {
   if (slot->ops != NULL) {
-    io->failed = slot->ops->read(slot->self, now_ns, &io->pose, &io->twist, &io->buttons) < HAP_OK;
+    io->failed =
+        !hapi_device_did(slot->ops->read(slot->self, now_ns, &io->pose, &io->twist, &io->buttons));
     return;
   }
   hapi_triple_take(&slot->target_buffer);
@@ -263,7 +264,7 @@ void hapi_pointers_write(hapi_haptic *haptic)
     }
     hapi_pointer_output out = {.reached = p->device.wrench};
     if (slot->ops != NULL) {
-      out.failed = slot->ops->write(slot->self, &p->device.wrench, &out.reached) < HAP_OK;
+      out.failed = !hapi_device_did(slot->ops->write(slot->self, &p->device.wrench, &out.reached));
     }
     if (haptic->tape != NULL) {
       hapi_tape_output(haptic, i, &out);

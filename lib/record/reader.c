@@ -9,6 +9,7 @@
 #include "base/alloc.h"
 #include "base/assert.h"
 #include "base/log.h"
+#include "base/regular.h"
 #include "record/grammar.h"
 
 /* Of one stream, read while the cells of another one are sought. In what a recorder writes they
@@ -316,10 +317,10 @@ static hap_status reader_prepare(hapi_reader *reader, const char *path, const ch
   if (reader->stored == NULL || reader->bytes == NULL || !reader->inflates) {
     return reader_starve(reader, detail);
   }
-  reader->file = fopen(path, "rb");
+  const char *why = NULL;
+  reader->file = hapi_regular_open(path, &why);
   if (reader->file == NULL) {
-    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be opened: %s", reader->path,
-                     strerror(errno));
+    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be opened: %s", reader->path, why);
   }
   HAPI_TRY(read_head(reader, detail));
   HAPI_TRY(read_info(reader, ode, detail));

@@ -8,6 +8,7 @@
 #include "base/assert.h"
 #include "base/log.h"
 #include "base/number.h"
+#include "base/regular.h"
 
 static const char *const names[HAPI_CSV_COLUMNS_MAX] = {"t", "x", "y", "z", "qw", "qx", "qy", "qz"};
 
@@ -121,10 +122,10 @@ static hap_status read_header(hapi_csv *csv, hap_detail *detail)
 hap_status hapi_csv_open(hapi_csv *csv, const char *path, hap_detail *detail)
 {
   *csv = (hapi_csv){.path = path};
-  csv->file = fopen(path, "rb");
+  const char *why = NULL;
+  csv->file = hapi_regular_open(path, &why);
   if (csv->file == NULL) {
-    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be opened: %s", short_path(path),
-                     strerror(errno));
+    return hapi_fail(detail, HAP_ERROR_IO, "%s: cannot be opened: %s", short_path(path), why);
   }
   return read_header(csv, detail);
 }

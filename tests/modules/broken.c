@@ -330,6 +330,9 @@ static hap_status broken_write(void *self, const hap_wrench *wanted, hap_wrench 
   if (fault_is(d, "write_is_slow")) {
     rest_ms(1.5);
   }
+  if (fault_is(d, "odd_write_status")) {
+    return (hap_status)42;
+  }
   return saturated && !fault_is(d, "limit_is_not_said") ? HAP_SATURATED : HAP_OK;
 }
 
