@@ -47,6 +47,8 @@ static const program programs[] = {
      "what the hand feels at the port from 0.5 to 200 Hz, and the stiffest wall of each device; "
      "--coupling\n"
      "             NAME: through it in the proxy's place"},
+    {"input", bench_input,
+     "the felt force while a device tells positions that are false for 0.2 s"},
     {"jitter", bench_jitter,
      "how late the haptic thread wakes up, against cyclictest; page faults, context switches"},
     {"line", bench_line, "a SPIDAR at 1 kHz through its emulator: ticks without a new answer"},

@@ -615,6 +615,34 @@ TEST(positions_that_jump_are_not_believed)
   CHECK(line.bad_steps >= 5 && abs(line.counts.counts[6] - before) < 5);
 }
 
+TEST(encoders_that_are_off_or_stand_still)
+{
+  const emulator_def def = x4r_of(EMULATOR_HAND_PUSH);
+  hapi_spidar_line line;
+  stage *s = stage_begin(&def, &line);
+  (void)stage_tick(s, &line, taut);
+  REQUIRE(stage_tick(s, &line, taut));
+  int32_t before[8];
+  memcpy(before, line.counts.counts, sizeof before);
+  stage_tell(s, "false 5 200");
+  (void)stage_tick(s, &line, taut);
+  REQUIRE(stage_tick(s, &line, taut));
+  for (int i = 0; i < 8; ++i) {
+    CHECK(abs(line.counts.counts[i] - before[i] - (i == 5 ? 200 : 0)) <= 3);
+  }
+  stage_tell(s, "false all 0");
+  stage_tell(s, "stuck 6 1");
+  emulator_advance(&s->emulator, s->now + 1.8); /* the hand has moved by then */
+  s->now = emulator_time(&s->emulator);
+  (void)stage_tick(s, &line, taut);
+  (void)stage_tick(s, &line, taut);
+  CHECK(abs(line.counts.counts[6] - before[6]) <= 3 && line.counts.counts[5] != before[5]);
+  stage_tell(s, "stuck all 0");
+  (void)stage_tick(s, &line, taut);
+  (void)stage_tick(s, &line, taut);
+  CHECK(abs(line.counts.counts[6] - before[6]) > 3);
+}
+
 /* ---- mechanics ---- */
 
 /* With the tensions that the device would ask for: what the hand feels is what was wanted. */
@@ -684,6 +712,10 @@ static const char *const good_commands[] = {"lose reply",
                                             "late 0.002",
                                             "garbage 10",
                                             "report 1 B5M",
+                                            "false 3 -300",
+                                            "false all 0",
+                                            "stuck 7 1",
+                                            "stuck all 0",
                                             "saturate 100",
                                             "power",
                                             "unplug",
@@ -708,6 +740,10 @@ static const char *const bad_commands[] = {"",
                                            "garbage",
                                            "report 2 B3M",
                                            "report 1 B9M",
+                                           "false 8 1",
+                                           "false 1",
+                                           "false 1 40000",
+                                           "stuck 1 2",
                                            "saturate 4096",
                                            "power 1",
                                            "unplug -1",

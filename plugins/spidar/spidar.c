@@ -347,15 +347,13 @@ static bool is_lost(const hapi_spidar_device *device)
   return atomic_load(&device->cause) != HAPI_SPIDAR_WELL;
 }
 
-static bool begin_line(hapi_spidar_device *device)
+static bool begin_line(hapi_spidar_device *device, const hapi_spidar_port *port)
 {
   double finest = fabs(device->model.metres_per_count[0]);
-  hapi_spidar_port port;
   for (int i = 1; i < device->model.strings; ++i) {
     finest = fmin(finest, fabs(device->model.metres_per_count[i]));
   }
-  hapi_spidar_serial_port(&device->serial, &port);
-  return hapi_spidar_line_begin(&device->line, &port, &device->boards, SPEED_MOST / finest) >=
+  return hapi_spidar_line_begin(&device->line, port, &device->boards, SPEED_MOST / finest) >=
          HAP_OK;
 }
 
@@ -441,10 +439,17 @@ static void let_go(hapi_spidar_device *device)
   hapi_spidar_guard_end(&device->guard);
 }
 
-static hap_status fail_start(hapi_spidar_device *device, hapi_spidar_cause cause)
+hapi_spidar_cause hapi_spidar_begin(hapi_spidar_device *device, const hapi_spidar_port *port)
 {
-  let_go(device);
-  return device_fail(device, cause);
+  reset_ticks(device);
+  if (!begin_line(device, port) || !strings_tauten(device)) {
+    return HAPI_SPIDAR_SILENT;
+  }
+  if (!settle_pose(device)) {
+    return HAPI_SPIDAR_MISFIT;
+  }
+  device->running = true;
+  return HAPI_SPIDAR_WELL;
 }
 
 static hap_status spidar_start(void *self)
@@ -462,14 +467,13 @@ static hap_status spidar_start(void *self)
              "spidar: there is no guard process: when this one is killed, the "
              "motors keep their currents");
   }
-  reset_ticks(device);
-  if (!begin_line(device) || !strings_tauten(device)) {
-    return fail_start(device, HAPI_SPIDAR_SILENT);
+  hapi_spidar_port port;
+  hapi_spidar_serial_port(&device->serial, &port);
+  hapi_spidar_cause cause = hapi_spidar_begin(device, &port);
+  if (cause != HAPI_SPIDAR_WELL) {
+    let_go(device);
+    return device_fail(device, cause);
   }
-  if (!settle_pose(device)) {
-    return fail_start(device, HAPI_SPIDAR_MISFIT);
-  }
-  device->running = true;
   return HAP_OK;
 }
 

@@ -74,6 +74,10 @@ HAP_NODISCARD hap_status hapi_spidar_configure(hapi_spidar_device *device, const
                                                hap_detail *detail);
 void hapi_spidar_release(hapi_spidar_device *device);
 
+/* [control] The part of start behind an open port: tells the boards their lengths, winds the
+ * strings in, finds the grip. WELL: it runs. Else its caller lets go. */
+hapi_spidar_cause hapi_spidar_begin(hapi_spidar_device *device, const hapi_spidar_port *port);
+
 /* [control] At the next start the grip is at home, whatever a file said. Not while it is
  * started. */
 void hapi_spidar_forget_home(hapi_spidar_device *device);

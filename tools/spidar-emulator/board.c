@@ -33,7 +33,8 @@ double board_tick_hz(const board *b)
 
 int16_t board_position(const board *b, int motor)
 {
-  return (int16_t)(uint16_t)(uint32_t)(b->counts[motor] - b->origin[motor]);
+  int32_t told = b->counts[motor] + b->lies.false_by[motor];
+  return (int16_t)(uint16_t)(uint32_t)(told - b->origin[motor]);
 }
 
 /* ---- replies ---- */
@@ -229,21 +230,21 @@ static bool take_byte(board *b, uint8_t byte, double header_time, double time, b
 bool board_receive(board *b, uint8_t byte, double time, board_reply *out)
 {
   bool replies = false;
-  b->fifo[b->fifo_have] = byte;
-  b->fifo_times[b->fifo_have++] = time;
-  if (b->fifo_have < BOARD_FIFO) {
+  b->fifo.bytes[b->fifo.have] = byte;
+  b->fifo.times[b->fifo.have++] = time;
+  if (b->fifo.have < BOARD_FIFO) {
     return false;
   }
   board_run(b, time);
   for (int i = 0; i < BOARD_FIFO; ++i) {
     /* Two headers within six bytes: the second one's reply overwrites the first. */
     board_reply reply;
-    if (take_byte(b, b->fifo[i], b->fifo_times[i], time, &reply)) {
+    if (take_byte(b, b->fifo.bytes[i], b->fifo.times[i], time, &reply)) {
       *out = reply;
       replies = true;
     }
   }
-  b->fifo_have = 0;
+  b->fifo.have = 0;
   return replies;
 }
 
@@ -271,8 +272,9 @@ void board_tick(board *b, const int32_t counts[HAPI_SPIDAR_MOTORS])
   int motors = hapi_spidar_kind_find(b->model)->motors;
   ++b->tick;
   for (int i = 0; i < motors; ++i) {
-    b->velocity[i] = (int16_t)(counts[i] - b->counts[i]);
-    b->counts[i] = counts[i];
+    int32_t now = b->lies.stuck[i] ? b->counts[i] : counts[i];
+    b->velocity[i] = (int16_t)(now - b->counts[i]);
+    b->counts[i] = now;
     b->output[i] = b->current[i];
     if (b->mode != BOARD_CURRENT) {
       b->output[i] = motor_control(b, i, motors);

@@ -30,6 +30,19 @@ typedef struct board_reply {
   uint8_t bytes[HAPI_SPIDAR_FRAME_MAX];
 } board_reply;
 
+/* Of the receiver. */
+typedef struct board_fifo {
+  uint8_t bytes[BOARD_FIFO];
+  double times[BOARD_FIFO];
+  int have;
+} board_fifo;
+
+/* What is wrong with its encoders. */
+typedef struct board_lies {
+  int16_t false_by[HAPI_SPIDAR_MOTORS]; /* counts that it is off */
+  bool stuck[HAPI_SPIDAR_MOTORS];       /* it stands still */
+} board_lies;
+
 typedef struct board {
   int id;
   int model;         /* what it is */
@@ -37,9 +50,7 @@ typedef struct board {
   int current_limit; /* 0..4095: currents are clipped to it */
 
   hapi_spidar_cutter cutter;
-  uint8_t fifo[BOARD_FIFO];
-  double fifo_times[BOARD_FIFO];
-  int fifo_have;
+  board_fifo fifo;
 
   hapi_spidar_frame pending; /* a command whose last byte came */
   double pending_due;        /* s; < 0: none */
@@ -57,6 +68,7 @@ typedef struct board {
   int32_t origin[HAPI_SPIDAR_MOTORS];   /* subtracted: RESET_SENSOR */
   int16_t velocity[HAPI_SPIDAR_MOTORS]; /* counts per control tick */
   int16_t output[HAPI_SPIDAR_MOTORS];   /* current that the motor gets */
+  board_lies lies;
   int16_t force[HAPI_SPIDAR_FORCES];
 
   uint32_t dice;

@@ -15,6 +15,8 @@ const char emulator_help[] =
     "late SECONDS                    every reply, from now on\n"
     "garbage N                       bytes on the reply line\n"
     "report BOARD B3M                what it says it is\n"
+    "false STRING|all COUNTS         its encoder is off by so much, -32768 to 32767\n"
+    "stuck STRING|all 0|1            its encoder stands still\n"
     "saturate CURRENT                currents are clipped to it, 0 to 4095\n"
     "power                           off and on: counts and lengths begin anew\n"
     "unplug [SECONDS], plug          the cable\n"
@@ -80,6 +82,17 @@ static bool read_silent(const word *words, int count, emulator_action *out)
   return count == 3 &&
          (word_is(&words[1], "all") || read_number(&words[1], 0.0, 7.0, out->number)) &&
          read_number(&words[2], 0.0, 1.0, &out->number[1]);
+}
+
+/* Of a string or all: "false" and "stuck". */
+static bool read_encoder(const word *words, int count, emulator_action *out)
+{
+  bool stuck = word_is(&words[0], "stuck");
+  out->kind = stuck ? EMULATOR_STUCK : EMULATOR_FALSE;
+  out->number[0] = -1.0;
+  return count == 3 &&
+         (word_is(&words[1], "all") || read_number(&words[1], 0.0, 7.0, out->number)) &&
+         read_number(&words[2], stuck ? 0.0 : -32768.0, stuck ? 1.0 : 32767.0, &out->number[1]);
 }
 
 static bool read_report(const word *words, int count, emulator_action *out)
@@ -157,10 +170,8 @@ static bool read_action(const word *words, int count, emulator_action *out)
   static const struct {
     const char *name;
     bool (*read)(const word *words, int count, emulator_action *out);
-  } others[] = {{"silent", read_silent},
-                {"report", read_report},
-                {"hand", read_hand},
-                {"push", read_push},
+  } others[] = {{"silent", read_silent}, {"report", read_report}, {"hand", read_hand},
+                {"push", read_push},     {"false", read_encoder}, {"stuck", read_encoder},
                 {"unplug", read_unplug}};
   for (size_t i = 0; i < sizeof faults / sizeof faults[0]; ++i) {
     if (word_is(&words[0], faults[i].name)) {

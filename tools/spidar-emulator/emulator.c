@@ -281,6 +281,23 @@ static void tension_saturate(emulator *e, int limit)
   }
 }
 
+/* string < 0: all of them. */
+static void encoder_spoil(emulator *e, int string, const int16_t *false_by, const bool *stuck)
+{
+  int first = 0;
+  for (int i = 0; i < e->wire.count; ++i) {
+    board *b = &e->wire.boards[i];
+    int motors = hapi_spidar_kind_find(b->model)->motors;
+    for (int k = 0; k < motors; ++k) {
+      if (string < 0 || string == first + k) {
+        b->lies.false_by[k] = false_by != NULL ? *false_by : b->lies.false_by[k];
+        b->lies.stuck[k] = stuck != NULL ? *stuck : b->lies.stuck[k];
+      }
+    }
+    first += motors;
+  }
+}
+
 void emulator_do(emulator *e, const emulator_action *action)
 {
   const double *n = action->number;
@@ -312,6 +329,12 @@ void emulator_do(emulator *e, const emulator_action *action)
       break;
     case EMULATOR_SATURATE:
       tension_saturate(e, (int)n[0]);
+      break;
+    case EMULATOR_FALSE:
+      encoder_spoil(e, (int)n[0], &(int16_t){(int16_t)n[1]}, NULL);
+      break;
+    case EMULATOR_STUCK:
+      encoder_spoil(e, (int)n[0], NULL, &(bool){n[1] != 0.0});
       break;
     case EMULATOR_PUSH:
       hapi_v3_copy(n, e->push);

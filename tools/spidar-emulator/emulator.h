@@ -41,6 +41,8 @@ typedef enum emulator_action_kind {
   EMULATOR_POWER,    /* off and on */
   EMULATOR_REPORT,   /* board number[0] says it is model number[1] */
   EMULATOR_SATURATE, /* currents are clipped to number[0] */
+  EMULATOR_FALSE,    /* the encoder of string number[0] (-1: all) is off by number[1] counts */
+  EMULATOR_STUCK,    /* it stands still: number[1] */
   EMULATOR_PUSH,     /* number: N */
   EMULATOR_HAND,     /* number[0]: emulator_hand */
   EMULATOR_STATE,    /* of the program: says the state */

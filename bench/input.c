@@ -1,0 +1,76 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "bench/bench.h"
+#include "bench/false_input.h"
+
+/* hapode-bench input: what the hand feels while its device tells positions that are false for
+ * 0.2 s. */
+
+#define PEAK_MOST 1.1 /* of the undisturbed one */
+#define STEP_MOST 2.0 /* N in 2 ms, beyond the undisturbed one */
+
+typedef struct runs {
+  false_input_run right;
+  false_input_run run;
+} runs;
+
+static hap_status case_measure(bench *b, FILE *csv, const false_input_def *def, runs *r)
+{
+  false_input_figures f;
+  hap_status status = false_input_measure(def, &r->run, &b->detail);
+  if (status < HAP_OK) {
+    return status;
+  }
+  false_input_compare(def, &r->right, &r->run, &f);
+  const char *device = false_input_device_name(def->device);
+  const char *name = false_input_name(def->kind);
+  bool good = f.peak <= PEAK_MOST * f.peak_right && f.step <= STEP_MOST + f.step_right;
+  fprintf(csv, "%s,%s,%s,%g,%g,%.4g,%.4g,%.4g,%.4g,%u,%.4g,%.4g\n", device,
+          def->row ? "row" : "wall", name, def->stiffness, def->haptic_hz, f.peak, f.peak_right,
+          f.step, f.step_right, r->run.fault, r->run.fault_s, r->run.told_s);
+  bench_check(b, good,
+              "%s, %s, %g N/m, %g Hz, %s: %.2f N (undisturbed %.2f), in 2 ms %.2f N (%.2f), "
+              "fault %u after %.0f ms, told after %.0f ms %s",
+              device, def->row ? "row" : "wall", def->stiffness, def->haptic_hz, name, f.peak,
+              f.peak_right, f.step, f.step_right, r->run.fault, 1e3 * r->run.fault_s,
+              1e3 * r->run.told_s, r->run.text);
+  return HAP_OK;
+}
+
+hap_status bench_input(bench *b)
+{
+  static const double rates[] = {1000.0, 5000.0, 10000.0};
+  hap_status status = HAP_OK;
+  runs *r = malloc(sizeof *r);
+  FILE *csv = bench_csv_open(b, "input",
+                             "device,world,fault,stiffness_n_per_m,haptic_hz,peak_n,"
+                             "peak_right_n,step_2ms_n,step_right_n,latched,fault_s,told_s");
+  if (r == NULL || csv == NULL) {
+    free(r);
+    return bench_csv_close(b, csv, r == NULL ? HAP_ERROR_MEMORY : HAP_ERROR_IO);
+  }
+  for (int device = 0; device < FALSE_INPUT_DEVICES && status >= HAP_OK; ++device) {
+    for (size_t rate = 0; rate < (b->quick || device == FALSE_INPUT_SPIDAR ? 1 : 3); ++rate) {
+      for (int row = 0; row < 2; ++row) {
+        for (int kind = 0; kind < FALSE_KINDS && status >= HAP_OK; ++kind) {
+          false_input_def def;
+          false_input_init(&def);
+          def.device = (false_input_device)device;
+          def.row = row != 0;
+          def.haptic_hz = rates[rate];
+          if (kind == FALSE_NOTHING) {
+            status = false_input_measure(&def, &r->right, &b->detail);
+            continue;
+          }
+          def.kind = (false_input_kind)kind;
+          status = case_measure(b, csv, &def, r);
+        }
+      }
+    }
+  }
+  free(r);
+  return bench_csv_close(b, csv, status);
+}
