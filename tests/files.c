@@ -4,12 +4,14 @@
 #include "tests/files.h"
 
 #include <ftw.h>
+#include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "tests/tap.h"
 
 #define PATHS 8
+#define MODULES 8
 
 char test_folder[100];
 
@@ -41,6 +43,7 @@ bool folder_make(void)
   const char *base = getenv("TMPDIR");
   snprintf(test_folder, sizeof test_folder, "%.70s/hapode-test-XXXXXX",
            base != NULL ? base : "/tmp");
+  (void)umask(022); /* modules that others may write are refused */
   if (mkdtemp(test_folder) == NULL) {
     return tap_bail_out("no temporary folder");
   }
@@ -55,6 +58,43 @@ const char *folder_path(const char *name)
   next = (next + 1) % PATHS;
   snprintf(paths[next], sizeof paths[next], "%s/%s", test_folder, name);
   return paths[next];
+}
+
+static void file_copy(const char *from, const char *to)
+{
+  struct stat about;
+  FILE *file = fopen(from, "r");
+  size_t size = file != NULL && fstat(fileno(file), &about) == 0 ? (size_t)about.st_size : 0;
+  char *bytes = calloc(size + 1, 1);
+  if (file != NULL && bytes != NULL && fread(bytes, 1, size, file) == size) {
+    file_write_bytes(to, bytes, size);
+  }
+  free(bytes);
+  if (file != NULL) {
+    fclose(file);
+  }
+}
+
+const char *folder_module(const char *variable)
+{
+  static char paths[MODULES][160];
+  static int count;
+  const char *from = getenv(variable);
+  const char *name = from != NULL ? strrchr(from, '/') : NULL;
+  if (name == NULL) {
+    return NULL;
+  }
+  const char *path = folder_path(name + 1);
+  for (int i = 0; i < count; ++i) {
+    if (strcmp(paths[i], path) == 0) {
+      return paths[i];
+    }
+  }
+  file_copy(from, path);
+  if (count == MODULES || chmod(path, 0755) != 0) {
+    return NULL;
+  }
+  return strcpy(paths[count++], path);
 }
 
 bool file_exists(const char *path)

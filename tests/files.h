@@ -17,6 +17,10 @@ void folder_clear(void);
 /* Of the last eight calls. */
 const char *folder_path(const char *name);
 
+/* A copy of the module that the variable names, in that folder: a module is loaded only from where
+ * nobody else may write, and a build tree may be open to all. NULL: there is none. */
+const char *folder_module(const char *variable);
+
 bool file_exists(const char *path);
 /* "" when it cannot be read. Until the next call. */
 const char *file_text(const char *path);

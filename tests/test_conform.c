@@ -43,7 +43,7 @@ static int device_check(const char *spec, const char *options)
 static const char *broken_check(const char *fault)
 {
   static char spec[600];
-  snprintf(spec, sizeof spec, "module:%s,break=%s", getenv("HAPODE_BROKEN"), fault);
+  snprintf(spec, sizeof spec, "module:%s,break=%s", folder_module("HAPODE_BROKEN"), fault);
   return spec;
 }
 
@@ -235,7 +235,7 @@ TEST(a_device_that_does_not_open_is_said)
   CHECK(strstr(ran.out, "not ok 1 - open\nBail out!") != NULL);
   CHECK(device_check("no_such_device", "") == 1);
   CHECK(strstr(ran.out, "there are: virtual, replay, spidar, module") != NULL);
-  CHECK(device_check(getenv("HAPODE_BROKEN"), "") == 1); /* no name before the path */
+  CHECK(device_check(folder_module("HAPODE_BROKEN"), "") == 1); /* no name before the path */
 }
 
 TEST(options_that_do_not_go_together_are_refused)

@@ -709,7 +709,7 @@ TEST(a_recording_that_cannot_be_is_said)
 /* One that starts again at the fourth time. */
 TEST(a_lost_device_ends_the_run_unless_it_is_to_be_waited_for)
 {
-  const char *module = getenv("HAPODE_BROKEN");
+  const char *module = folder_module("HAPODE_BROKEN");
   REQUIRE(module != NULL);
   CHECK(run("--scene slide --lockstep --seconds 4 --device module:%s,break=unplugged", module) ==
         1);
