@@ -25,6 +25,15 @@ typedef struct mechanism {
 
 typedef void (*build_fn)(mechanism *m);
 
+/* A mechanism that is held against ODE's for a second. */
+typedef struct joint_case {
+  const char *name;
+  build_fn build;
+  double gravity;
+  double way;  /* m, bounds of mechanisms_compare */
+  double turn; /* rad */
+} joint_case;
+
 /* Box masses; the first body has a ball as its geom, the others have none. */
 static inline dBodyID add_body(mechanism *m, double mass, const double edges[3], double x, double y,
                                double z)

@@ -13,6 +13,9 @@
 
 #define AT(x, y, z) ((const double[3]){(x), (y), (z)})
 
+static const hap_model all_models[4] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
+                                        HAP_MODEL_CONTACT};
+
 static inline void ode_world_make(double gravity, dWorldID *out_world, dSpaceID *out_space)
 {
   *out_world = dWorldCreate();
@@ -29,11 +32,30 @@ static inline void ode_world_stiffen(dWorldID world, int iterations)
   dWorldSetQuickStepNumIterations(world, iterations);
 }
 
-/* world: NULL when it is gone already. */
+static inline void ode_geom_end(dGeomID geom)
+{
+  bool mesh = dGeomGetClass(geom) == dTriMeshClass;
+  bool field = dGeomGetClass(geom) == dHeightfieldClass;
+  dTriMeshDataID mesh_data = mesh ? dGeomTriMeshGetTriMeshDataID(geom) : NULL;
+  dHeightfieldDataID field_data = field ? dGeomHeightfieldGetHeightfieldData(geom) : NULL;
+  dGeomDestroy(geom);
+  if (mesh) {
+    dGeomTriMeshDataDestroy(mesh_data);
+  }
+  if (field) {
+    dGeomHeightfieldDataDestroy(field_data);
+  }
+}
+
+/* Data of meshes and heightfields that are left in the space go as well; each geom has its own.
+ * world: NULL when it is gone already. */
 static inline void ode_world_end(hap_session *session, dWorldID world, dSpaceID space)
 {
   if (world != NULL) {
     hap_session_destroy(session);
+    while (dSpaceGetNumGeoms(space) > 0) {
+      ode_geom_end(dSpaceGetGeom(space, 0));
+    }
     dSpaceDestroy(space);
     dWorldDestroy(world);
   }

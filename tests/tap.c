@@ -14,6 +14,7 @@
 #define TAP_SLOW 1.0 /* s: what takes longer is said */
 
 int tap_failures;
+const void *tap_row;
 const char *tap_argument = "";
 
 static int tap_count;
@@ -189,6 +190,21 @@ static bool tap_is_asked(const char *name)
   return strncmp(tap_argument, "except=", 7) != 0 || !tap_is_listed(name, tap_argument + 7);
 }
 
+static void tap_run_asked(void (*test)(void), const char *name)
+{
+  if (tap_is_asked(name)) {
+    tap_run(test, name);
+  }
+}
+
+static void tap_run_rows(void (*test)(void), const tap_table *table)
+{
+  for (size_t i = 0; i < table->count; ++i) {
+    tap_row = (const char *)table->rows + i * table->row_size;
+    tap_run_asked(test, *(const char *const *)tap_row);
+  }
+}
+
 int tap_main(const tap_test *tests, size_t count, bool (*set_up)(void), int argc, char **argv)
 {
   tap_argument = argc > 1 ? argv[1] : "";
@@ -197,8 +213,10 @@ int tap_main(const tap_test *tests, size_t count, bool (*set_up)(void), int argc
     dInitODE2(0);
     dAllocateODEDataForThread(dAllocateMaskAll);
     for (size_t i = 0; i < count; ++i) {
-      if (tap_is_asked(tests[i].name)) {
-        tap_run(tests[i].run, tests[i].name);
+      if (tests[i].table != NULL) {
+        tap_run_rows(tests[i].run, tests[i].table);
+      } else {
+        tap_run_asked(tests[i].run, tests[i].name);
       }
     }
   }

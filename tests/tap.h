@@ -8,6 +8,13 @@
  *
  *   TEST(name) { CHECK_NEAR(a, b, 1e-9); }
  *
+ * Tests that differ in their data alone are the rows of a table. The first member of a row is the
+ * name of its test:
+ *
+ *   static const fall falls[] = {{"a_ball_falls", ball, 9.81}, {"a_cube_falls", cube, 9.81}};
+ *
+ *   TEST_EACH(falls, const fall *row) { CHECK(...); }
+ *
  * make_main.py writes main: it runs all tests of a file in their order, with ODE initialised. A
  * file with a main of its own lists its tests by RUN. What must come before ODE and the first test:
  *
@@ -23,12 +30,20 @@
 
 #include <hapode/attributes.h>
 
+typedef struct tap_table {
+  const void *rows;
+  size_t row_size;
+  size_t count;
+} tap_table;
+
 typedef struct tap_test {
   const char *name;
   void (*run)(void);
+  const tap_table *table; /* NULL: one test, else one for each row */
 } tap_test;
 
 extern int tap_failures;         /* in the running test */
+extern const void *tap_row;      /* of the running test, in its table */
 extern const char *tap_argument; /* the program's first, or "" */
 
 void tap_note(const char *file, int line, const char *what);
@@ -63,6 +78,15 @@ static inline void tap_check(bool good, const char *file, int line, const char *
 #define TEST(name)        \
   void test_##name(void); \
   void test_##name(void)
+#define TEST_EACH(table, row)                                                              \
+  static void each_##table(row);                                                           \
+  extern const tap_table rows_##table;                                                     \
+  const tap_table rows_##table = {table, sizeof table[0], sizeof table / sizeof table[0]}; \
+  TEST(table)                                                                              \
+  {                                                                                        \
+    each_##table(tap_row);                                                                 \
+  }                                                                                        \
+  static void each_##table(row)
 #define SET_UP           \
   bool tap_set_up(void); \
   bool tap_set_up(void)

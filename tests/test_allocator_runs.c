@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "tests/failing_heap.h"
+#include "tests/solids.h"
 #include "tests/stage.h"
 #include "tools/rig.h"
 
@@ -142,44 +143,31 @@ static bool work_run(void)
   return good;
 }
 
-static void run_each(const char *scene_name, hap_drive drive, const char *first, const char *second)
+typedef struct allocator_run {
+  const char *name;
+  scenario of; /* in each model */
+} allocator_run;
+
+static const allocator_run runs[] = {
+    {"every_model_in_lockstep_with_failing_allocations", {"row10:3", .drive = HAP_DRIVE_LOCKSTEP}},
+    {"every_model_with_joints_with_failing_allocations",
+     {"lightstand", .drive = HAP_DRIVE_LOCKSTEP}},
+    {"every_model_with_a_tool_with_failing_allocations", {"lever", .drive = HAP_DRIVE_LOCKSTEP}},
+    {"every_model_in_a_frame_loop_with_failing_allocations", {"fig6", .drive = HAP_DRIVE_FRAME}},
+    {"every_model_in_threads_with_failing_allocations", {"slide", .drive = HAP_DRIVE_THREADS}},
+    {"two_devices_with_failing_allocations",
+     {"row10:2", .drive = HAP_DRIVE_LOCKSTEP,
+      .devices = {recorded_hand, "virtual:path=0:0.3/0/0;1:0.2/0/0,hand=relaxed,dof=6"}}},
+};
+
+TEST_EACH(runs, const allocator_run *row)
 {
   for (int model = 0; model < 4; ++model) {
-    now = (scenario){scene_name, (hap_model)model, drive, {first, second}};
-    printf("# %s, %s\n", scene_name, hap_model_name(now.model));
+    now = row->of;
+    now.model = (hap_model)model;
+    printf("# %s, %s\n", now.scene, hap_model_name(now.model));
     fail_each(work_run, true);
   }
-}
-
-TEST(every_model_in_lockstep_with_failing_allocations)
-{
-  run_each("row10:3", HAP_DRIVE_LOCKSTEP, NULL, NULL);
-}
-
-TEST(every_model_with_joints_with_failing_allocations)
-{
-  run_each("lightstand", HAP_DRIVE_LOCKSTEP, NULL, NULL);
-}
-
-TEST(every_model_with_a_tool_with_failing_allocations)
-{
-  run_each("lever", HAP_DRIVE_LOCKSTEP, NULL, NULL);
-}
-
-TEST(every_model_in_a_frame_loop_with_failing_allocations)
-{
-  run_each("fig6", HAP_DRIVE_FRAME, NULL, NULL);
-}
-
-TEST(every_model_in_threads_with_failing_allocations)
-{
-  run_each("slide", HAP_DRIVE_THREADS, NULL, NULL);
-}
-
-TEST(two_devices_with_failing_allocations)
-{
-  run_each("row10:2", HAP_DRIVE_LOCKSTEP, recorded_hand,
-           "virtual:path=0:0.3/0/0;1:0.2/0/0,hand=relaxed,dof=6");
 }
 
 /* ---- refusals ---- */
@@ -295,25 +283,12 @@ typedef enum ground {
   GROUNDS
 } ground;
 
-typedef struct field {
-  dTriMeshDataID data;
-  float corners[4][3];
-  dTriIndex triangles[6];
-} field;
-
-static void add_ground(stage *s, ground kind, field *out)
+static void add_ground(stage *s, ground kind)
 {
-  static const float corners[4][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
-  static const dTriIndex triangles[6] = {0, 1, 2, 0, 2, 3};
   if (kind == GROUND_PLANE) {
     dCreatePlane(s->space, 0.0, 0.0, 1.0, 0.0);
   } else if (kind == GROUND_MESH) {
-    memcpy(out->corners, corners, sizeof corners);
-    memcpy(out->triangles, triangles, sizeof triangles);
-    out->data = dGeomTriMeshDataCreate();
-    dGeomTriMeshDataBuildSingle(out->data, out->corners, 3 * sizeof(float), 4, out->triangles, 6,
-                                3 * sizeof(dTriIndex));
-    dCreateTriMesh(s->space, out->data, NULL, NULL, NULL);
+    mesh_floor(s->space);
   } else {
     dBodyID body = dBodyCreate(s->world);
     dBodySetKinematic(body);
@@ -326,7 +301,6 @@ static void add_ground(stage *s, ground kind, field *out)
  * no memory for them, the body is left to ODE. */
 static void check_stands(ground kind)
 {
-  field f = {NULL};
   hap_pointer_id id;
   hap_pointer_def def;
   const hap_pose above = {{0.0, 0.0, 0.12}, {1.0, 0.0, 0.0, 0.0}};
@@ -335,7 +309,7 @@ static void check_stands(ground kind)
   dWorldSetContactSurfaceLayer(s->world, 1e-4);
   dBodySetPosition(s->cube, 0.0, 0.0, 0.05);
   if (kind != GROUND_BODY) {
-    add_ground(s, kind, &f);
+    add_ground(s, kind);
   }
   hap_pointer_def_init(&def, sizeof def);
   REQUIRE(stage_create(s) == HAP_OK);
@@ -347,7 +321,7 @@ static void check_stands(ground kind)
     (void)add_cube(s, 5.0 + 0.2 * i, NULL); /* the table of bodies is full */
   }
   if (kind == GROUND_BODY) {
-    add_ground(s, kind, &f);
+    add_ground(s, kind);
   }
   CHECK(hap_session_advance(s->session, 500) == HAP_OK);
   CHECK_NEAR(dBodyGetPosition(s->cube)[2], 0.05, 2e-3);
@@ -355,10 +329,6 @@ static void check_stands(ground kind)
   CHECK(hap_session_advance(s->session, 500) == HAP_OK);
   CHECK_NEAR(dBodyGetPosition(s->cube)[2], 0.05, 2e-3);
   CHECK(stats_of(s).model.range_bodies > 0); /* the loop has it again */
-  stage_end(s);
-  if (f.data != NULL) {
-    dGeomTriMeshDataDestroy(f.data);
-  }
 }
 
 TEST(without_memory_for_its_contacts_a_body_stands_on_the_ground)

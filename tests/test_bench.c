@@ -73,6 +73,38 @@ static void check_program(const char *name, const char *header, int rows_least)
   check_picture(name);
 }
 
+typedef struct plain_table {
+  const char *name;
+  const char *program;
+  const char *header;
+  int rows_least;
+} plain_table;
+
+static const plain_table tables[] = {
+    {"fig6_leaves_its_table", "fig6", "model,step,t,duty,testing,bodies,layout,neighbours,tick_us",
+     1000},
+    {"fig7_leaves_its_table", "fig7", "model,step,t,duty,testing,bodies,layout,neighbours,tick_us",
+     1000},
+    {"scaling_leaves_its_table", "scaling",
+     "bodies,neighbours,model,build_ms,step_ms,tick_us,probes,probe_ms,island_step_ms,"
+     "library_ms,scene,range,owned,range_ms,publish_ms,gap",
+     21},
+    {"jitter_leaves_its_table", "jitter",
+     "rate_hz,policy,p50_us,p99_us,p999_us,max_us,missed,source,turn,ticks,tick_us_p50,"
+     "tick_us_p99,tick_us_max,minor_faults,major_faults,voluntary_switches,"
+     "involuntary_switches",
+     12},
+    {"tick_leaves_its_table", "tick",
+     "model,neighbours,contacts,tick_ns,ns_per_neighbour,p99_ns,scene,phase,rows,sweeps,"
+     "ode_ns,pass_ns",
+     25},
+};
+
+TEST_EACH(tables, const plain_table *row)
+{
+  check_program(row->program, row->header, row->rows_least);
+}
+
 TEST(fig5_leaves_its_tables)
 {
   check_program("fig5", "model,t,force_n,stiffness,physics_hz", 1000);
@@ -125,16 +157,6 @@ TEST(edits_leaves_its_table)
   check_picture("edits");
 }
 
-TEST(fig6_leaves_its_table)
-{
-  check_program("fig6", "model,step,t,duty,testing,bodies,layout,neighbours,tick_us", 1000);
-}
-
-TEST(fig7_leaves_its_table)
-{
-  check_program("fig7", "model,step,t,duty,testing,bodies,layout,neighbours,tick_us", 1000);
-}
-
 /* Of the checks those that are no times hold on every machine. */
 TEST(spidar_numerics_hold)
 {
@@ -162,23 +184,6 @@ TEST(the_line_of_a_spidar_is_measured)
                    "model,boards,realtime,ticks,late,missed,late_share,tick_us_p50,tick_us_p99,"
                    "tick_us_max,floor_ticks,floor_late,floor_missed,floor_late_share,pulled_ms") ==
         2);
-}
-
-TEST(scaling_leaves_its_table)
-{
-  check_program("scaling",
-                "bodies,neighbours,model,build_ms,step_ms,tick_us,probes,probe_ms,island_step_ms,"
-                "library_ms,scene,range,owned,range_ms,publish_ms,gap",
-                21);
-}
-
-TEST(jitter_leaves_its_table)
-{
-  check_program("jitter",
-                "rate_hz,policy,p50_us,p99_us,p999_us,max_us,missed,source,turn,ticks,tick_us_p50,"
-                "tick_us_p99,tick_us_max,minor_faults,major_faults,voluntary_switches,"
-                "involuntary_switches",
-                12);
 }
 
 TEST(poses_are_drawn_within_their_bound)
@@ -218,14 +223,6 @@ TEST(impedance_is_that_of_the_closed_forms)
                    "passive_stiffness,coupling_stiffness,proxy_stiffness,proxy_felt") == 4 * 4);
   check_picture("impedance");
   check_picture("zwidth");
-}
-
-TEST(tick_leaves_its_table)
-{
-  check_program("tick",
-                "model,neighbours,contacts,tick_ns,ns_per_neighbour,p99_ns,scene,phase,rows,sweeps,"
-                "ode_ns,pass_ns",
-                25);
 }
 
 /* ---- accuracy ---- */

@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "tests/contact_world.h"
 #include "tests/owned_rig.h"
+#include "tests/solids.h"
 
 #define G CW_GRAVITY
 
@@ -336,55 +337,11 @@ TEST(a_body_added_in_front_of_another_is_pushed_with_it)
 
 /* ---- ground of triangles ---- */
 
-#define GRID 24
-
-typedef struct mesh {
-  dTriMeshDataID data;
-  float vertices[(GRID + 1) * (GRID + 1) * 3];
-  dTriIndex indices[GRID * GRID * 6];
-} mesh;
-
-static double ground_flat(double x, double y)
+/* Ridges along y, 0.1 m apart and 0.05 m high, in cells of 0.05 m. */
+static double ground_ridges(int i, int k)
 {
-  (void)x;
-  (void)y;
-  return 0.0;
-}
-
-/* Ridges along y, 0.1 m apart and 0.05 m high. */
-static double ground_ridges(double x, double y)
-{
-  (void)y;
-  double t = fmod(x + 10.0, 0.1) / 0.1;
-  return 0.1 * (t < 0.5 ? t : 1.0 - t) - 0.05;
-}
-
-static void add_mesh(contact_world *w, mesh *m, double cell, double (*height)(double, double))
-{
-  dTriIndex *at = m->indices;
-  for (int i = 0; i <= GRID; ++i) {
-    for (int k = 0; k <= GRID; ++k) {
-      double x = cell * (i - GRID / 2);
-      double y = cell * (k - GRID / 2);
-      float *v = m->vertices + 3 * (i * (GRID + 1) + k);
-      v[0] = (float)x;
-      v[1] = (float)y;
-      v[2] = (float)height(x, y);
-    }
-  }
-  for (int i = 0; i < GRID; ++i) {
-    for (int k = 0; k < GRID; ++k) {
-      dTriIndex a = (dTriIndex)(i * (GRID + 1) + k);
-      dTriIndex b = a + GRID + 1;
-      dTriIndex corners[6] = {a, b, b + 1, a, b + 1, a + 1};
-      memcpy(at, corners, sizeof corners);
-      at += 6;
-    }
-  }
-  m->data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildSingle(m->data, m->vertices, 3 * sizeof(float), (GRID + 1) * (GRID + 1),
-                              m->indices, GRID * GRID * 6, 3 * sizeof(dTriIndex));
-  dCreateTriMesh(w->space, m->data, NULL, NULL, NULL);
+  (void)k;
+  return i % 2 == 0 ? -0.05 : 0.0;
 }
 
 typedef struct slide {
@@ -398,12 +355,13 @@ typedef struct slide {
 /* A box pushed over the floor at 0.1 m/s, off the diagonals and seams. */
 static slide push_over(bool triangles)
 {
-  static mesh m;
+  static grid g;
   slide s = {0.0, 1e9, 0.0, 1e9, -1e9};
   contact_world *w = cw_new(G);
   w->expert.max_hull_points = 100000;
   if (triangles) {
-    add_mesh(w, &m, 0.031, ground_flat);
+    grid_fill(&g, 24, 0.031, grid_level);
+    grid_mesh(w->space, &g);
   } else {
     cw_add_floor(w);
   }
@@ -427,9 +385,6 @@ static slide push_over(bool triangles)
   CHECK(w->seen.range_min == 1);
   CHECK(stats.faults.count == 0);
   cw_close(w);
-  if (triangles) {
-    dGeomTriMeshDataDestroy(m.data);
-  }
   return s;
 }
 
@@ -445,12 +400,13 @@ TEST(a_box_slides_over_triangles_as_over_a_plane)
 
 TEST(a_ball_rolls_over_triangles_as_over_a_plane)
 {
-  static mesh m;
+  static grid g;
   double lowest = 1.0;
   double highest = 0.0;
   contact_world *w = cw_new(G);
   w->expert.max_hull_points = 100000;
-  add_mesh(w, &m, 0.031, ground_flat);
+  grid_fill(&g, 24, 0.031, grid_level);
+  grid_mesh(w->space, &g);
   cw_add_ball(w, 1.0, 0.03, -0.1, 0.013, 0.0299);
   dBodySetLinearVel(w->bodies[0], 0.2, 0.013, 0.0);
   dBodySetAngularVel(w->bodies[0], -0.013 / 0.03, 0.2 / 0.03, 0.0);
@@ -466,16 +422,15 @@ TEST(a_ball_rolls_over_triangles_as_over_a_plane)
   CHECK_NEAR(w->velocity[0][0] / 0.2, 1.0, 0.01);
   CHECK_NEAR(w->velocity[0][1], 0.013, 0.01 * 0.2);
   CHECK(highest - lowest < 1.5e-4);
-  cw_close(w);
-  dGeomTriMeshDataDestroy(m.data);
 }
 
 TEST(ridges_carry_a_box)
 {
-  static mesh m;
+  static grid g;
   contact_world *w = cw_new(G);
   w->expert.max_hull_points = 100000;
-  add_mesh(w, &m, 0.05, ground_ridges);
+  grid_fill(&g, 24, 0.05, ground_ridges);
+  grid_mesh(w->space, &g);
   cw_add_box(w, 1.0, (const double[3]){0.24, 0.1, 0.04}, 0.01, 0.013, 0.0199);
   cw_start(w, 0.01, 0.013, 0.055);
   cw_run(w, 1500);
@@ -487,28 +442,14 @@ TEST(ridges_carry_a_box)
   cw_go(w, 0.0, 0.0, -0.02, 400);
   CHECK_NEAR(w->force[2], 2000.0 * 3e-3, 2.0);
   CHECK_NEAR(w->position[0][2], 0.02, 2e-3);
-  cw_close(w);
-  dGeomTriMeshDataDestroy(m.data);
-}
-
-static dReal ground_height(void *user, int x, int z)
-{
-  (void)user;
-  (void)x;
-  (void)z;
-  return 0.0;
 }
 
 TEST(a_ball_on_a_heightfield_is_owned_and_felt)
 {
+  static grid g;
   contact_world *w = cw_new(G);
-  dHeightfieldDataID data = dGeomHeightfieldDataCreate();
-  dGeomHeightfieldDataBuildCallback(data, NULL, ground_height, 2.0, 2.0, 20, 20, 1.0, 0.0, 0.5, 0);
-  dGeomHeightfieldDataSetBounds(data, -0.1, 0.1);
-  dGeomID field = dCreateHeightfield(w->space, data, 1);
-  dMatrix3 rotation;
-  dRFromAxisAndAngle(rotation, 1.0, 0.0, 0.0, M_PI / 2.0);
-  dGeomSetRotation(field, rotation); /* its y upwards */
+  grid_fill(&g, 20, 0.1, grid_level);
+  grid_field(w->space, &g);
   cw_add_ball(w, 1.0, 0.05, 0.02, 0.03, 0.0499);
   cw_start(w, 0.02, 0.03, 0.112);
   cw_run(w, 200);
@@ -526,28 +467,18 @@ TEST(a_ball_on_a_heightfield_is_owned_and_felt)
   printf("# heightfield: %.3f .. %.3f N, z %.5f\n", least, most, w->position[0][2]);
   CHECK(least > 0.5 * 4.0 && most < 1.5 * 4.4);
   CHECK(w->position[0][2] > 0.045 && w->position[0][2] < 0.055);
-  cw_close(w);
-  dGeomHeightfieldDataDestroy(data);
 }
 
 /* ---- shapes and who collides ---- */
 
-static dReal cube_planes[] = {1, 0,  0, 0.04, -1, 0, 0, 0.04, 0, 1, 0,  0.04,
-                              0, -1, 0, 0.04, 0,  0, 1, 0.04, 0, 0, -1, 0.04};
-static dReal cube_points[] = {-0.04, -0.04, -0.04, 0.04,  -0.04, -0.04, -0.04, 0.04,
-                              -0.04, 0.04,  0.04,  -0.04, -0.04, -0.04, 0.04,  0.04,
-                              -0.04, 0.04,  -0.04, 0.04,  0.04,  0.04,  0.04,  0.04};
-static unsigned cube_faces[] = {4, 1, 3, 7, 5, 4, 0, 4, 6, 2, 4, 2, 6, 7, 3,
-                                4, 0, 1, 5, 4, 4, 4, 5, 7, 6, 4, 0, 2, 3, 1};
-
 TEST(a_hull_slides_as_a_box_does)
 {
+  static box_arrays box;
   dMass mass;
   contact_world *w = cw_new(G);
   cw_add_floor(w);
   dMassSetBoxTotal(&mass, 1.0, 0.08, 0.08, 0.08);
-  cw_add(w, dCreateConvex(w->space, cube_planes, 6, cube_points, 8, cube_faces), &mass, 0.0, 0.0,
-         0.0399);
+  cw_add(w, convex_box(w->space, &box, AT(0.04, 0.04, 0.04)), &mass, 0.0, 0.0, 0.0399);
   cw_start(w, -0.0505, 0.0, 0.012);
   cw_go(w, 0.1, 0.0, 0.0, 600);
   double worst = 0.0;

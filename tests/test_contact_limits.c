@@ -12,6 +12,7 @@
 #include "haptic/haptic_internal.h"
 #include "session/session_internal.h"
 #include "tests/contact_world.h"
+#include "tests/solids.h"
 #include "tests/unknown_shape.h"
 
 static double cube_height(const contact_world *w)
@@ -46,20 +47,14 @@ TEST(a_session_that_starts_again_owns_what_it_owned)
 /* Of these the loop would have no contacts: ODE keeps them. */
 TEST(a_convex_body_without_room_for_its_points_stays_on_the_floor)
 {
-  static const dReal planes[] = {1,  0, 0, 0.025, 0, 1,  0, 0.025, 0, 0, 1,  0.025,
-                                 -1, 0, 0, 0.025, 0, -1, 0, 0.025, 0, 0, -1, 0.025};
-  static const dReal points[] = {.025,  .025,  .025,  .025, -.025, .025,  -.025, .025,
-                                 .025,  -.025, -.025, .025, .025,  .025,  -.025, .025,
-                                 -.025, -.025, -.025, .025, -.025, -.025, -.025, -.025};
-  static const unsigned polygons[] = {4, 0, 2, 3, 1, 4, 0, 1, 5, 4, 4, 0, 4, 6, 2,
-                                      4, 7, 5, 1, 3, 4, 7, 3, 2, 6, 4, 7, 6, 4, 5};
+  static box_arrays box;
   for (int room = 0; room < 2; ++room) {
     dMass mass;
     contact_world *w = cw_new(CW_GRAVITY);
     cw_add_floor(w);
     dMassSetBoxTotal(&mass, 0.5, 0.05, 0.05, 0.05);
     w->expert.max_hull_points = room != 0 ? 64 : 0;
-    cw_add(w, dCreateConvex(w->space, planes, 6, points, 8, polygons), &mass, 0.0, 0.0, 0.0249);
+    cw_add(w, convex_box(w->space, &box, AT(0.025, 0.025, 0.025)), &mass, 0.0, 0.0, 0.0249);
     cw_start(w, 0.0, 0.0, 0.065);
     CHECK(hap_session_advance(w->session, 1000) == HAP_OK);
     CHECK(cw_stats(w).model.range_bodies == (room != 0 ? 1u : 0u));
@@ -170,7 +165,7 @@ TEST(a_measured_body_answers_all_that_touch_it_alike)
   contact_world *w = cw_new(CW_GRAVITY);
   cw_add_floor(w);
   dBodyID cube = cw_add_cube(w, 0.2, 0.05, 0.025, 0.0, 0.025);
-  dHeightfieldDataID data = add_unknown_shape(w->space, cube);
+  add_unknown_shape(w->space, cube);
   (void)cw_add_cube(w, 0.2, 0.05, 0.0755, 0.0, 0.025);
   cw_start(w, -0.012, 0.003, 0.035);
   cw_move_hand(w, 0.1, 0.0, 0.0);
@@ -181,8 +176,6 @@ TEST(a_measured_body_answers_all_that_touch_it_alike)
   CHECK(cw_stats(w).model.measured_bodies == 1 && cw_stats(w).model.range_bodies == 1);
   CHECK(met > 100);
   CHECK(w->position[1][0] > 0.08); /* it was pushed on */
-  cw_close(w);
-  dGeomHeightfieldDataDestroy(data);
 }
 
 /* The same of a cube that only two hands touch. */
@@ -194,7 +187,7 @@ TEST(a_measured_body_answers_two_hands_alike)
   contact_world *w = cw_new(CW_GRAVITY);
   cw_add_floor(w);
   dBodyID cube = cw_add_cube(w, 2.0, 0.05, 0.025, 0.0, 0.025);
-  dHeightfieldDataID data = add_unknown_shape(w->space, cube);
+  add_unknown_shape(w->space, cube);
   cw_start(w, -0.012, 0.01, 0.03);
   CHECK(hap_pointer_add(w->session, &w->hand_def, &other) == HAP_OK);
   CHECK(hap_pointer_set_target(w->session, other, &pose, NULL) == HAP_OK);
@@ -205,8 +198,6 @@ TEST(a_measured_body_answers_two_hands_alike)
   }
   CHECK(cw_stats(w).model.measured_bodies == 1);
   CHECK(met > 10);
-  cw_close(w);
-  dGeomHeightfieldDataDestroy(data);
 }
 
 /* The rest of the row answers with no more than one body's own mass. */

@@ -9,6 +9,7 @@
 #include "session/session_internal.h"
 #include "tests/body_bits.h"
 #include "tests/physics_world.h"
+#include "tests/solids.h"
 #include "tests/stage.h"
 
 /* What an application changes in a world that is felt: bodies in place of others, settings, the
@@ -685,10 +686,7 @@ static double height_after(bool told)
   for (int i = 0; i < 4; ++i) {
     corners[i][2] = 0.0;
   }
-  dTriMeshDataID data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(data, corners, sizeof corners[0], 4, triangles, 6,
-                              3 * sizeof triangles[0]);
-  dGeomID mesh = dCreateTriMesh(s->space, data, NULL, NULL, NULL);
+  dGeomID mesh = mesh_create(s->space, corners[0], 4, triangles, 6);
   dBodySetPosition(s->cube, 0.0, 0.0, 0.05);
   double height = (double)NAN;
   if (stage_create(s) == HAP_OK) {
@@ -700,6 +698,7 @@ static double height_after(bool told)
     for (int i = 0; i < 4; ++i) {
       corners[i][2] = -0.03;
     }
+    dTriMeshDataID data = dGeomTriMeshGetTriMeshDataID(mesh);
     dGeomTriMeshDataBuildDouble(data, corners, sizeof corners[0], 4, triangles, 6,
                                 3 * sizeof triangles[0]);
     dGeomTriMeshSetData(mesh, data);
@@ -710,7 +709,6 @@ static double height_after(bool told)
     height = dBodyGetPosition(s->cube)[2];
   }
   stage_end(s);
-  dGeomTriMeshDataDestroy(data);
   return height;
 }
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "contact_world.h"
+#include "solids.h"
 #include "tools/rig.h"
 
 /* Each effect: decided from worlds that are made for it, for its reason; off leaves it out; auto
@@ -215,13 +216,7 @@ TEST(friction_calls_for_friction_and_for_torque)
 
 TEST(a_plane_needs_no_shape_and_a_convex_geom_has_none)
 {
-  static const double planes[] = {0, 0,  1, 0.02, 0, 0, -1, 0.02, 0,  1, 0, 0.02,
-                                  0, -1, 0, 0.02, 1, 0, 0,  0.02, -1, 0, 0, 0.02};
-  static const double points[] = {-.02, -.02, -.02, .02,  -.02, -.02, -.02, .02,
-                                  -.02, .02,  .02,  -.02, -.02, -.02, .02,  .02,
-                                  -.02, .02,  -.02, .02,  .02,  .02,  .02,  .02};
-  static const unsigned polygons[] = {4, 4, 5, 7, 6, 4, 0, 2, 3, 1, 4, 2, 6, 7, 3,
-                                      4, 0, 1, 5, 4, 4, 1, 3, 7, 5, 4, 0, 4, 6, 2};
+  static box_arrays box;
   contact_world *w = cw_new(0.0);
   cw_add_floor(w);
   cw_start(w, 0.0, 0.0, HAND + 0.002);
@@ -234,7 +229,7 @@ TEST(a_plane_needs_no_shape_and_a_convex_geom_has_none)
   dMass m;
   w = cw_new(0.0);
   dMassSetBoxTotal(&m, 0.1, 0.04, 0.04, 0.04);
-  cw_add(w, dCreateConvex(w->space, planes, 6, points, 8, polygons), &m, 0.0, 0.0, 0.0);
+  cw_add(w, convex_box(w->space, &box, AT(0.02, 0.02, 0.02)), &m, 0.0, 0.0, 0.0);
   cw_start(w, 0.0, 0.0, 0.02 + HAND + 0.002);
   cw_run(w, 60);
   CHECK(is_off(w, HAP_EFFECT_SHAPE, HAP_REASON_NO_CLOSED_FORM));
@@ -242,11 +237,10 @@ TEST(a_plane_needs_no_shape_and_a_convex_geom_has_none)
 
 TEST(a_tool_that_touches_is_near_and_has_no_closed_form)
 {
-  static const double corners[8][3] = {
-      {-HAND, -HAND, -HAND}, {HAND, -HAND, -HAND}, {-HAND, HAND, -HAND}, {HAND, HAND, -HAND},
-      {-HAND, -HAND, HAND},  {HAND, -HAND, HAND},  {-HAND, HAND, HAND},  {HAND, HAND, HAND}};
+  double corners[24];
+  box_corners(AT(HAND, HAND, HAND), AT(0.0, 0.0, 0.0), corners);
   contact_world *w = open_on_floor(1);
-  w->hand_def.hull_xyz = &corners[0][0];
+  w->hand_def.hull_xyz = corners;
   w->hand_def.hull_points = 8;
   w->hand_def.radius = 0.001;
   start_left(w, 0.002);

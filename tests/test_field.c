@@ -7,54 +7,28 @@
 #include "tests/tap.h"
 
 #include "tests/contact_world.h"
+#include "tests/solids.h"
 
 #define RADIUS 0.01
 #define K 1000.0
 #define CELLS 20
 #define CELL 0.05 /* m */
 
-typedef double (*height_of)(double x);
-
-static double plain_height(double x)
+static double slope_height(int i, int k)
 {
-  (void)x;
-  return 0.0;
+  (void)k;
+  return 0.5 * CELL * (i - CELLS / 2);
 }
 
-static double slope_height(double x)
+static double ridge_height(int i, int k)
 {
-  return 0.5 * x;
-}
-
-static double ridge_height(double x)
-{
-  return -0.5 * fabs(x);
-}
-
-static double field_heights[(CELLS + 1) * (CELLS + 1)];
-
-/* Its y is up in the world, and x is x. */
-static dHeightfieldDataID add_field(contact_world *w, height_of height)
-{
-  const double width = CELLS * CELL;
-  dHeightfieldDataID data = dGeomHeightfieldDataCreate();
-  dMatrix3 upright;
-  for (int i = 0; i <= CELLS; ++i) {
-    for (int k = 0; k <= CELLS; ++k) {
-      field_heights[i * (CELLS + 1) + k] = height(CELL * k - 0.5 * width);
-    }
-  }
-  dGeomHeightfieldDataBuildDouble(data, field_heights, 0, width, width, CELLS + 1, CELLS + 1, 1.0,
-                                  0.0, 1.0, 0);
-  dGeomID geom = dCreateHeightfield(w->space, data, 1);
-  dRFromAxisAndAngle(upright, 1.0, 0.0, 0.0, 0.5 * M_PI);
-  dGeomSetRotation(geom, upright);
-  return data;
+  return -fabs(slope_height(i, k));
 }
 
 /* Down to a place, and what is felt there. */
-static void hand_press(height_of height, hap_model model, double x, double z, double out[3])
+static void hand_press(grid_height height, hap_model model, double x, double z, double out[3])
 {
+  static grid ground;
   contact_world w;
   cw_open(&w, 0.0);
   w.def.model = model;
@@ -64,7 +38,8 @@ static void hand_press(height_of height, hap_model model, double x, double z, do
   w.hand_def.damping = 0.0;
   w.hand_expert.coupling = HAP_COUPLING_DIRECT;
   cw_add_cube(&w, 1.0, 0.1, 5.0, 0.0, 0.0);
-  dHeightfieldDataID data = add_field(&w, height);
+  grid_fill(&ground, CELLS, CELL, height);
+  grid_field(w.space, &ground);
   cw_start(&w, x, 0.013, z + 0.05);
   cw_move_hand(&w, 0.0, 0.0, -0.05);
   cw_run(&w, 1000);
@@ -72,17 +47,13 @@ static void hand_press(height_of height, hap_model model, double x, double z, do
   cw_run(&w, 100);
   memcpy(out, w.force, sizeof w.force);
   cw_close(&w);
-  dGeomHeightfieldDataDestroy(data);
 }
-
-static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                   HAP_MODEL_CONTACT};
 
 TEST(a_sphere_feels_a_plain)
 {
   for (int i = 0; i < 4; ++i) {
     double force[3] = {0.0};
-    hand_press(plain_height, models[i], 0.021, RADIUS - 0.005, force);
+    hand_press(grid_level, all_models[i], 0.021, RADIUS - 0.005, force);
     CHECK_NEAR(force[0], 0.0, 1e-6);
     CHECK_NEAR(force[2], 5.0, 1e-6);
   }
@@ -92,7 +63,7 @@ TEST(a_sphere_feels_a_plain)
 TEST(a_sphere_feels_a_plain_as_deep_as_it_is)
 {
   double force[3] = {0.0};
-  hand_press(plain_height, HAP_MODEL_CONTACT, 0.021, RADIUS - 0.03, force);
+  hand_press(grid_level, HAP_MODEL_CONTACT, 0.021, RADIUS - 0.03, force);
   CHECK_NEAR(force[2], 30.0, 1e-6);
 }
 
@@ -102,7 +73,7 @@ TEST(a_sphere_feels_a_slope_along_its_normal)
   for (int i = 0; i < 4; ++i) {
     double force[3] = {0.0};
     double z = 0.5 * 0.021 + (RADIUS - 0.004) * sqrt(1.25); /* 4 mm deep */
-    hand_press(slope_height, models[i], 0.021, z, force);
+    hand_press(slope_height, all_models[i], 0.021, z, force);
     CHECK_NEAR(force[0], 4.0 * n[0], 1e-6);
     CHECK_NEAR(force[1], 0.0, 1e-6);
     CHECK_NEAR(force[2], 4.0 * n[2], 1e-6);
@@ -114,7 +85,7 @@ TEST(a_sphere_feels_a_ridge)
 {
   for (int i = 0; i < 4; ++i) {
     double force[3] = {0.0};
-    hand_press(ridge_height, models[i], 0.0, RADIUS - 0.003, force);
+    hand_press(ridge_height, all_models[i], 0.0, RADIUS - 0.003, force);
     CHECK_NEAR(force[0], 0.0, 1e-6);
     CHECK_NEAR(force[2], 3.0, 1e-6);
   }
@@ -123,78 +94,16 @@ TEST(a_sphere_feels_a_ridge)
 TEST(beside_its_end_a_field_is_not_felt)
 {
   double force[3] = {0.0};
-  hand_press(plain_height, HAP_MODEL_CONTACT, 0.5 * CELLS * CELL + 2.0 * RADIUS, RADIUS - 0.005,
+  hand_press(grid_level, HAP_MODEL_CONTACT, 0.5 * CELLS * CELL + 2.0 * RADIUS, RADIUS - 0.005,
              force);
   CHECK(force[0] == 0.0 && force[1] == 0.0 && force[2] == 0.0);
 }
 
 /* ---- bodies on a field: the loop moves them, on the field's triangles ---- */
 
-#define ROUGH 12
-#define ROUGH_CELL 0.02
-
 static double rough_height(int i, int k)
 {
   return 0.0008 * sin(1.7 * i + 0.4 * k) + 0.0005 * cos(2.3 * k - 0.9 * i);
-}
-
-static double rough_heights[(ROUGH + 1) * (ROUGH + 1)];
-
-typedef struct rough {
-  dHeightfieldDataID field;
-  dTriMeshDataID mesh;
-  double vertices[(ROUGH + 1) * (ROUGH + 1) * 3];
-  dTriIndex indices[ROUGH * ROUGH * 6];
-} rough;
-
-static void rough_fill(void)
-{
-  for (int k = 0; k <= ROUGH; ++k) {
-    for (int i = 0; i <= ROUGH; ++i) {
-      rough_heights[k * (ROUGH + 1) + i] = rough_height(i, k);
-    }
-  }
-}
-
-/* The field's z is -y of the world. */
-static void rough_add_field(contact_world *w, rough *r)
-{
-  const double width = ROUGH * ROUGH_CELL;
-  dMatrix3 upright;
-  rough_fill();
-  r->field = dGeomHeightfieldDataCreate();
-  dGeomHeightfieldDataBuildDouble(r->field, rough_heights, 0, width, width, ROUGH + 1, ROUGH + 1,
-                                  1.0, 0.0, 1.0, 0);
-  dGeomID geom = dCreateHeightfield(w->space, r->field, 1);
-  dRFromAxisAndAngle(upright, 1.0, 0.0, 0.0, 0.5 * M_PI);
-  dGeomSetRotation(geom, upright);
-}
-
-/* The same triangles. */
-static void rough_add_mesh(contact_world *w, rough *r)
-{
-  const double width = ROUGH * ROUGH_CELL;
-  dTriIndex *at = r->indices;
-  for (int k = 0; k <= ROUGH; ++k) {
-    for (int i = 0; i <= ROUGH; ++i) {
-      double *v = &r->vertices[(size_t)3 * (size_t)(k * (ROUGH + 1) + i)];
-      v[0] = ROUGH_CELL * i - 0.5 * width;
-      v[1] = -(ROUGH_CELL * k - 0.5 * width);
-      v[2] = rough_height(i, k);
-    }
-  }
-  for (int k = 0; k < ROUGH; ++k) {
-    for (int i = 0; i < ROUGH; ++i) {
-      dTriIndex a = (dTriIndex)(k * (ROUGH + 1) + i);
-      const dTriIndex cell[6] = {a, a + ROUGH + 1, a + 1, a + 1, a + ROUGH + 1, a + ROUGH + 2};
-      memcpy(at, cell, sizeof cell);
-      at += 6;
-    }
-  }
-  r->mesh = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(r->mesh, r->vertices, 3 * sizeof(double), (ROUGH + 1) * (ROUGH + 1),
-                              r->indices, ROUGH * ROUGH * 6, 3 * sizeof(dTriIndex));
-  dCreateTriMesh(w->space, r->mesh, NULL, NULL, NULL);
 }
 
 typedef struct slide {
@@ -207,17 +116,18 @@ typedef struct slide {
 /* A crate that is dragged over rough ground. */
 static slide crate_slide(bool field, double physics_hz)
 {
-  static rough r;
+  static grid ground;
   slide s = {.largest = 0.0};
   contact_world *w = cw_new(CW_GRAVITY);
   w->def.physics_hz = physics_hz;
   w->def.max_contacts = 2048;
   w->expert.max_hull_points = 20000;
   cw_add_box(w, 0.5, (const double[3]){0.06, 0.05, 0.04}, -0.03, 0.004, 0.0212);
+  grid_fill(&ground, 12, 0.02, rough_height);
   if (field) {
-    rough_add_field(w, &r);
+    grid_field(w->space, &ground);
   } else {
-    rough_add_mesh(w, &r);
+    grid_mesh(w->space, &ground);
   }
   cw_start(w, -0.075, 0.004, 0.03);
   cw_run(w, 200);
@@ -231,11 +141,6 @@ static slide crate_slide(bool field, double physics_hz)
   s.measured = stats.model.measured_bodies;
   memcpy(s.at, w->position[0], sizeof s.at);
   cw_close(w);
-  if (field) {
-    dGeomHeightfieldDataDestroy(r.field);
-  } else {
-    dGeomTriMeshDataDestroy(r.mesh);
-  }
   return s;
 }
 
@@ -289,8 +194,6 @@ static void ball_rests(bool placeable, bool wraps, const double at[3])
   printf("# placeable %d wraps %d: lowest %.4f\n", placeable, wraps, least);
   CHECK(stats.model.range_bodies == 1 && stats.model.measured_bodies == 0);
   CHECK(least > 0.02 && least < 0.06);
-  cw_close(w);
-  dGeomHeightfieldDataDestroy(data);
 }
 
 TEST(a_field_may_have_no_pose_and_no_end)
@@ -333,6 +236,4 @@ TEST(a_field_may_change)
   printf("# lifted to %.5f\n", w->position[0][2]);
   CHECK(stats.model.range_bodies == 1);
   CHECK_NEAR(w->position[0][2], 0.03 + lift_height, 3e-3);
-  cw_close(w);
-  dGeomHeightfieldDataDestroy(data);
 }

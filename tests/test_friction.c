@@ -14,9 +14,7 @@
 #define RADIUS 0.01
 #define MU 0.5
 
-static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                   HAP_MODEL_CONTACT};
-#define MODELS (sizeof models / sizeof models[0])
+#define MODELS (sizeof all_models / sizeof all_models[0])
 
 static contact_world *open_world(hap_model model, double gravity)
 {
@@ -47,7 +45,7 @@ static void press_floor(contact_world *w, double depth)
 TEST(sticking_is_a_spring_of_the_contacts_stiffness)
 {
   for (size_t m = 0; m < MODELS; ++m) {
-    contact_world *w = open_world(models[m], CW_GRAVITY);
+    contact_world *w = open_world(all_models[m], CW_GRAVITY);
     press_floor(w, 0.002);
     CHECK_NEAR(w->force[2], 4.0, 4e-3);
     CHECK_NEAR(w->force[0], 0.0, 1e-9);
@@ -70,7 +68,7 @@ TEST(sliding_is_coulombs_in_every_direction)
   for (size_t m = 0; m < MODELS; ++m) {
     for (int i = 0; i < 24; ++i) {
       double angle = 2.0 * M_PI * (i + 0.3) / 24.0;
-      contact_world *w = open_world(models[m], CW_GRAVITY);
+      contact_world *w = open_world(all_models[m], CW_GRAVITY);
       press_floor(w, 0.002);
       cw_go(w, 0.05 * cos(angle), 0.05 * sin(angle), 0.0, 100);
       CHECK_NEAR(w->force[0], -MU * w->force[2] * cos(angle), 1e-3 * MU * w->force[2]);
@@ -169,10 +167,10 @@ TEST(sticking_drags_a_block_over_the_floor)
 {
   for (size_t m = 0; m < MODELS; ++m) {
     double mass = 0.5;
-    if (models[m] == HAP_MODEL_IMPULSE || models[m] == HAP_MODEL_ACCELERANCE) {
+    if (all_models[m] == HAP_MODEL_IMPULSE || all_models[m] == HAP_MODEL_ACCELERANCE) {
       continue; /* as far as they go: see test_grasp */
     }
-    contact_world *w = open_world(models[m], CW_GRAVITY);
+    contact_world *w = open_world(all_models[m], CW_GRAVITY);
     w->hand_def.damping = 20.0;
     w->hand_def.friction = 0.9;
     press_cube(w, mass, 0.1, 0.1, 0.003);
@@ -247,10 +245,10 @@ TEST(soft_fingers_are_a_torsion_spring_of_k_r2)
 {
   for (size_t m = 0; m < MODELS; ++m) {
     pinch p;
-    if (models[m] == HAP_MODEL_IMPULSE) {
+    if (all_models[m] == HAP_MODEL_IMPULSE) {
       continue; /* its poses are a step late: it shakes */
     }
-    open_pinch(&p, models[m], 120.0);
+    open_pinch(&p, all_models[m], 120.0);
     double torque = 0.01; /* of 0.024 that they hold */
     p.w->user.torque[0] = torque;
     cw_run(p.w, 3000);
@@ -270,10 +268,10 @@ TEST(beyond_their_limit_soft_fingers_slip_and_brake)
 {
   for (size_t m = 0; m < MODELS; ++m) {
     pinch p;
-    if (models[m] == HAP_MODEL_IMPULSE) {
+    if (all_models[m] == HAP_MODEL_IMPULSE) {
       continue;
     }
-    open_pinch(&p, models[m], 5.0);
+    open_pinch(&p, all_models[m], 5.0);
     double torque = 0.1;
     double limit = 2.0 * MU * 4.0 * FINGER;
     double inertia = 0.2 * 0.2 * 0.2 / 6.0;
@@ -294,7 +292,7 @@ TEST(turning_and_sliding_share_one_limit)
   for (size_t m = 0; m < MODELS; ++m) {
     hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
     hap_twist twist = {{0.05, 0.0, 0.0}, {0.0, 0.0, 4.0}};
-    contact_world *w = open_world(models[m], CW_GRAVITY);
+    contact_world *w = open_world(all_models[m], CW_GRAVITY);
     w->hand_def.finger_radius = FINGER;
     press_floor(w, 0.002);
     for (int i = 1; i <= 400; ++i) {

@@ -13,9 +13,7 @@
 #define RADIUS 0.01
 #define STIFFNESS 2000.0
 
-static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                   HAP_MODEL_CONTACT};
-#define MODELS (sizeof models / sizeof models[0])
+#define MODELS (sizeof all_models / sizeof all_models[0])
 
 /* What the callback is asked, and says. */
 static struct {
@@ -66,7 +64,7 @@ static void cube_pull(contact_world *w, double way)
 TEST(the_callback_says_the_friction_of_a_geom)
 {
   for (size_t m = 0; m < MODELS; ++m) {
-    contact_world *w = open_world(models[m]);
+    contact_world *w = open_world(all_models[m]);
     w->ode.pointer_surface = pointer_surface;
     asked.says = 0.1;
     cube_pull(w, 0.002);
@@ -143,7 +141,7 @@ TEST(a_pointer_that_is_removed_lets_go)
   for (size_t m = 0; m < MODELS; ++m) {
     hap_pointer_id other;
     hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-    contact_world *w = open_world(models[m]);
+    contact_world *w = open_world(all_models[m]);
     cube_pull(w, 0.0004);
     CHECK_NEAR(w->force[0], -0.8, 1e-2);
     memcpy(pose.position, w->hand_at, sizeof pose.position);
@@ -161,7 +159,7 @@ TEST(a_pointer_that_is_removed_lets_go)
 TEST(a_body_that_is_destroyed_lets_go)
 {
   for (size_t m = 0; m < MODELS; ++m) {
-    contact_world *w = open_world(models[m]);
+    contact_world *w = open_world(all_models[m]);
     cube_pull(w, 0.0004);
     CHECK(hap_session_lock(w->session) == HAP_OK);
     dGeomID geom = dBodyGetFirstGeom(w->bodies[0]);
@@ -197,7 +195,7 @@ TEST(a_change_of_model_keeps_the_pull)
   contact_world *w = open_world(HAP_MODEL_CONTACT);
   cube_pull(w, 0.0004);
   for (size_t m = 0; m < MODELS; ++m) {
-    CHECK(hap_session_set_model(w->session, models[m]) == HAP_OK);
+    CHECK(hap_session_set_model(w->session, all_models[m]) == HAP_OK);
     cw_run(w, 100);
     CHECK_NEAR(w->force[0], -0.8, 5e-3);
   }
@@ -206,7 +204,7 @@ TEST(a_change_of_model_keeps_the_pull)
 TEST(a_conveyor_takes_the_hand_along)
 {
   for (size_t m = 0; m < MODELS; ++m) {
-    contact_world *w = open_world(models[m]);
+    contact_world *w = open_world(all_models[m]);
     cw_add_cube(w, 1.0, 0.3, 0.0, 0.0, 0.15);
     dBodySetKinematic(w->bodies[0]);
     cw_start(w, 0.0, 0.0, 0.3 + RADIUS + 0.001);

@@ -9,6 +9,7 @@
 #include <float.h>
 
 #include "tests/physics_world.h"
+#include "tests/solids.h"
 
 #define EDGE 0.1
 #define RADIUS 0.01
@@ -417,19 +418,13 @@ TEST(a_contact_that_is_no_number_is_dropped_and_counted)
 /* Where a convex geom and a box just touch, ODE's collider gives the normal (0, 0, 0). */
 TEST(a_contact_without_a_normal_is_dropped_and_counted)
 {
-  static const dReal planes[] = {1.0, 0.0,  0.0, 0.05, -1.0, 0.0, 0.0, 0.05, 0.0, 1.0, 0.0,  0.05,
-                                 0.0, -1.0, 0.0, 0.05, 0.0,  0.0, 1.0, 0.05, 0.0, 0.0, -1.0, 0.05};
-  static const dReal points[] = {-0.05, -0.05, -0.05, 0.05,  -0.05, -0.05, 0.05, 0.05,
-                                 -0.05, -0.05, 0.05,  -0.05, -0.05, -0.05, 0.05, 0.05,
-                                 -0.05, 0.05,  0.05,  0.05,  0.05,  -0.05, 0.05, 0.05};
-  static const unsigned faces[] = {4, 1, 2, 6, 5, 4, 0, 4, 7, 3, 4, 3, 7, 6, 2,
-                                   4, 0, 1, 5, 4, 4, 4, 5, 6, 7, 4, 0, 3, 2, 1};
+  static box_arrays box;
   for (int model = 0; model <= HAP_MODEL_CONTACT; ++model) {
     dMass mass;
     test_world *w = world_new(0.0, 20);
     w->def.model = (hap_model)model;
     dMassSetBoxTotal(&mass, 1.0, 0.1, 0.1, 0.1);
-    (void)world_add(w, dCreateConvex(w->space, planes, 6, points, 8, faces), &mass, 0.0, 0.0, 0.0);
+    (void)world_add(w, convex_box(w->space, &box, AT(0.05, 0.05, 0.05)), &mass, 0.0, 0.0, 0.0);
     (void)world_add(w, dCreateBox(w->space, 0.1, 0.1, 0.1), &mass, -0.1, 0.01, 0.075);
     world_start(w, RADIUS, 5.0, 0.0, 0.0);
     CHECK(hap_session_advance(w->session, 200) == HAP_OK);

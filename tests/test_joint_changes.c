@@ -340,8 +340,9 @@ TEST(chain_longer_than_the_range_is_odes)
   mechanism *m = mechanism_new(build_long_chain, 9.81);
   m->w.def.max_bodies = 9;
   check_left_to_ode(m);
-  m = mechanism_running(build_long_chain, 9.81);
+  m = mechanism_new(build_long_chain, 9.81);
   m->w.def.max_bodies = 10;
+  start_mechanism(m);
   cw_run(&m->w, 200);
   check_owned(m, 10);
 }

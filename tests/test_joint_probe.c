@@ -29,23 +29,6 @@ static void copy_state(const mechanism *from, mechanism *to)
   }
 }
 
-static void check_against_ode(build_fn build, double gravity, double way, double turn)
-{
-  mechanism *ode = mechanism_new(build, gravity);
-  mechanism *loop = mechanism_running(build, gravity);
-  cw_run(&loop->w, SETTLED_STEPS * STEP_TICKS + 1);
-  copy_state(loop, ode);
-  mechanism_difference d = mechanisms_compare(loop, ode, 1.0);
-  hap_stats stats = cw_stats(&loop->w);
-  printf("# off by %.3g mm, %.3g mrad; equations by %.3g, %llu probes\n", 1e3 * d.way, 1e3 * d.turn,
-         stats.model.joint_error, (unsigned long long)stats.probes.steps);
-  CHECK(d.way <= way);
-  CHECK(d.turn <= turn);
-  CHECK(stats.model.range_bodies == moving_bodies(loop) && stats.model.measured_bodies == 0);
-  CHECK(stats.model.range_joints == (uint32_t)loop->joint_count);
-  CHECK(stats.faults.fault == 0 && stats.probes.singular == 0);
-}
-
 static const double rod[3] = {0.04, 0.03, 0.2};
 
 static void build_piston(mechanism *m)
@@ -59,11 +42,6 @@ static void build_piston(mechanism *m)
   dBodySetLinearVel(second, 0.1, 0.0, 0.2);
 }
 
-TEST(piston_is_odes)
-{
-  check_against_ode(build_piston, 0.0, 2e-3, 2e-2);
-}
-
 static void build_pr(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
@@ -74,11 +52,6 @@ static void build_pr(mechanism *m)
   dJointSetPRAxis2(joint, 0.0, 1.0, 0.0);
   dBodySetAngularVel(first, 0.5, 1.0, -0.7);
   dBodySetLinearVel(second, 0.1, 0.0, 0.2);
-}
-
-TEST(prismatic_rotoide_is_odes)
-{
-  check_against_ode(build_pr, 0.0, 2e-3, 2e-2);
 }
 
 static void build_pu(mechanism *m)
@@ -115,11 +88,6 @@ static void build_rod(mechanism *m)
   dBodySetGyroscopicMode(second, 0);
 }
 
-TEST(distance_between_points_is_odes)
-{
-  check_against_ode(build_rod, 9.81, 2e-3, 2e-2);
-}
-
 static void build_double_hinge(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, rod, 0.0, 0.0, -0.1);
@@ -132,11 +100,6 @@ static void build_double_hinge(mechanism *m)
   dBodySetLinearVel(second, 0.2, 0.0, 0.0);
 }
 
-TEST(double_hinge_is_odes)
-{
-  check_against_ode(build_double_hinge, 9.81, 2e-3, 2e-2);
-}
-
 static void build_flat(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
@@ -145,11 +108,6 @@ static void build_flat(mechanism *m)
   add_hinge(m, first, second, AT(0.1, 0.0, 0.0), AT(0.0, 0.0, 1.0));
   dBodySetAngularVel(first, 0.0, 0.0, 3.0);
   dBodySetLinearVel(second, 0.1, 0.3, 0.0);
-}
-
-TEST(plane_is_odes)
-{
-  check_against_ode(build_flat, 9.81, 2e-3, 2e-2);
 }
 
 static void build_motor(mechanism *m)
@@ -165,20 +123,10 @@ static void build_motor(mechanism *m)
   dJointSetAMotorParam(joint, dParamFMax, 50.0);
 }
 
-TEST(angular_motor_is_odes)
-{
-  check_against_ode(build_motor, 9.81, 4e-3, 2e-2);
-}
-
 static void build_weak_motor(mechanism *m)
 {
   build_motor(m);
   dJointSetAMotorParam(m->joints[2], dParamFMax, 0.02);
-}
-
-TEST(motor_at_its_limit_is_odes)
-{
-  check_against_ode(build_weak_motor, 9.81, 4e-3, 2e-2);
 }
 
 static void build_drive(mechanism *m)
@@ -195,9 +143,32 @@ static void build_drive(mechanism *m)
   dBodySetAngularVel(first, 0.0, 0.0, 2.0);
 }
 
-TEST(linear_motor_is_odes)
+static const joint_case cases[] = {
+    {"piston_is_odes", build_piston, 0.0, 2e-3, 2e-2},
+    {"prismatic_rotoide_is_odes", build_pr, 0.0, 2e-3, 2e-2},
+    {"distance_between_points_is_odes", build_rod, 9.81, 2e-3, 2e-2},
+    {"double_hinge_is_odes", build_double_hinge, 9.81, 2e-3, 2e-2},
+    {"plane_is_odes", build_flat, 9.81, 2e-3, 2e-2},
+    {"angular_motor_is_odes", build_motor, 9.81, 4e-3, 2e-2},
+    {"motor_at_its_limit_is_odes", build_weak_motor, 9.81, 4e-3, 2e-2},
+    {"linear_motor_is_odes", build_drive, 9.81, 2e-3, 2e-2},
+};
+
+TEST_EACH(cases, const joint_case *row)
 {
-  check_against_ode(build_drive, 9.81, 2e-3, 2e-2);
+  mechanism *ode = mechanism_new(row->build, row->gravity);
+  mechanism *loop = mechanism_running(row->build, row->gravity);
+  cw_run(&loop->w, SETTLED_STEPS * STEP_TICKS + 1);
+  copy_state(loop, ode);
+  mechanism_difference d = mechanisms_compare(loop, ode, 1.0);
+  hap_stats stats = cw_stats(&loop->w);
+  printf("# off by %.3g mm, %.3g mrad; equations by %.3g, %llu probes\n", 1e3 * d.way, 1e3 * d.turn,
+         stats.model.joint_error, (unsigned long long)stats.probes.steps);
+  CHECK(d.way <= row->way);
+  CHECK(d.turn <= row->turn);
+  CHECK(stats.model.range_bodies == moving_bodies(loop) && stats.model.measured_bodies == 0);
+  CHECK(stats.model.range_joints == (uint32_t)loop->joint_count);
+  CHECK(stats.faults.fault == 0 && stats.probes.singular == 0);
 }
 
 /* A piston on a spring: stops that are soft. k = erp / (h cfm). */

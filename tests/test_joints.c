@@ -10,20 +10,6 @@
 
 #include "tests/joint_world.h"
 
-/* Against ODE's exact solver at the rate of the loop. */
-static void check_against_ode(build_fn build, double gravity, double way, double turn)
-{
-  mechanism *ode = mechanism_new(build, gravity);
-  mechanism *loop = mechanism_running(build, gravity);
-  mechanism_difference d = mechanisms_compare(loop, ode, 1.0);
-  printf("# off by %.3g mm, %.3g mrad; open by %.3g mm\n", 1e3 * d.way, 1e3 * d.turn, 1e3 * d.open);
-  CHECK(d.way <= way);
-  CHECK(d.turn <= turn);
-  CHECK(d.open <= CLOSED);
-  check_owned(loop, moving_bodies(loop));
-  CHECK(cw_norm(loop->w.impulse) == 0.0); /* the hand touched nothing */
-}
-
 /* ---- each kind by itself ---- */
 
 static void build_ball(mechanism *m)
@@ -39,22 +25,12 @@ static void build_ball(mechanism *m)
   dBodySetGyroscopicMode(second, 0);
 }
 
-TEST(ball_is_odes)
-{
-  check_against_ode(build_ball, 9.81, 2e-3, 2e-2);
-}
-
 static void build_hinge(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.1, 0.0, 0.0);
   dBodyID second = add_body(m, 0.3, bar, 0.3, 0.0, 0.0);
   add_hinge(m, NULL, first, AT(0.0, 0.0, 0.0), AT(0.0, 1.0, 0.0));
   add_hinge(m, first, second, AT(0.2, 0.0, 0.0), AT(0.0, 0.6, 0.8));
-}
-
-TEST(hinge_is_odes)
-{
-  check_against_ode(build_hinge, 9.81, 2e-3, 2e-2);
 }
 
 static void build_slider(mechanism *m)
@@ -66,22 +42,12 @@ static void build_slider(mechanism *m)
   dBodySetLinearVel(second, 0.1, 0.0, 0.2);
 }
 
-TEST(slider_is_odes)
-{
-  check_against_ode(build_slider, 0.0, 2e-3, 2e-2);
-}
-
 static void build_rail(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.1, 0.2, 0.0);
   dJointID joint = add_slider(m, NULL, first, AT(0.6, 0.0, -0.8));
   dJointSetSliderParam(joint, dParamHiStop, 0.2); /* of ODE's own direction, turned round here */
   dJointSetSliderParam(joint, dParamLoStop, -0.2);
-}
-
-TEST(slider_on_the_world_is_odes)
-{
-  check_against_ode(build_rail, 1.0, 2e-3, 1e-6);
 }
 
 static void build_universal(mechanism *m)
@@ -102,11 +68,6 @@ static void build_universal(mechanism *m)
   dJointSetUniversalParam(joints[0], dParamVel1, 0.4);
   dJointSetUniversalParam(joints[0], dParamFMax1, 0.03);
   dBodySetAngularVel(second, 0.0, 0.3, 1.0);
-}
-
-TEST(universal_is_odes)
-{
-  check_against_ode(build_universal, 2.0, 3e-3, 3e-2);
 }
 
 /* A wheel that is steered, driven and sprung, on a body in the air. */
@@ -160,20 +121,10 @@ static void build_fixed(mechanism *m)
   dBodySetAngularVel(first, 0.4, 1.0, 0.7);
 }
 
-TEST(fixed_is_odes)
-{
-  check_against_ode(build_fixed, 1.0, 2e-3, 2e-2);
-}
-
 static void build_fixed_to_world(mechanism *m)
 {
   dBodyID first = add_body(m, 0.5, bar, 0.0, 0.0, 0.0);
   dJointSetFixed(joint_keep(m, dJointCreateFixed(m->w.world, NULL), first, NULL));
-}
-
-TEST(fixed_to_the_world_stays)
-{
-  check_against_ode(build_fixed_to_world, 9.81, 1e-6, 1e-6);
 }
 
 /* ---- kinematic partners, loops, redundant joints ---- */
@@ -186,11 +137,6 @@ static void build_kinematic(mechanism *m)
   dBodySetLinearVel(carrier, 0.1, 0.05, 0.0);
   dBodySetAngularVel(carrier, 0.0, 0.5, 0.0);
   add_hinge(m, first, carrier, AT(0.0, 0.0, 0.0), AT(0.0, 1.0, 0.0));
-}
-
-TEST(kinematic_body_carries)
-{
-  check_against_ode(build_kinematic, 9.81, 2e-3, 2e-2);
 }
 
 /* Four bars with the world, in the plane y = 0; in space three degrees of freedom are held
@@ -208,11 +154,6 @@ static void build_four_bars(mechanism *m)
   add_hinge(m, left, top, AT(-0.1, 0.0, 0.2), y);
   add_hinge(m, top, right, AT(0.1, 0.0, 0.2), y);
   dBodySetLinearVel(top, 0.3, 0.0, 0.0);
-}
-
-TEST(four_bars_move_as_odes)
-{
-  check_against_ode(build_four_bars, 0.0, 2e-3, 2e-2);
 }
 
 static double kinetic_energy(const mechanism *m)
@@ -488,9 +429,31 @@ static void build_locked(mechanism *m)
   dJointSetHingeParam(hinge, dParamFMax, 100.0);
 }
 
-TEST(equal_stops_lock)
+static const joint_case cases[] = {
+    {"ball_is_odes", build_ball, 9.81, 2e-3, 2e-2},
+    {"hinge_is_odes", build_hinge, 9.81, 2e-3, 2e-2},
+    {"slider_is_odes", build_slider, 0.0, 2e-3, 2e-2},
+    {"slider_on_the_world_is_odes", build_rail, 1.0, 2e-3, 1e-6},
+    {"universal_is_odes", build_universal, 2.0, 3e-3, 3e-2},
+    {"fixed_is_odes", build_fixed, 1.0, 2e-3, 2e-2},
+    {"fixed_to_the_world_stays", build_fixed_to_world, 9.81, 1e-6, 1e-6},
+    {"kinematic_body_carries", build_kinematic, 9.81, 2e-3, 2e-2},
+    {"four_bars_move_as_odes", build_four_bars, 0.0, 2e-3, 2e-2},
+    {"equal_stops_lock", build_locked, 9.81, 1e-5, 1e-4},
+};
+
+/* Against ODE's exact solver at the rate of the loop. */
+TEST_EACH(cases, const joint_case *row)
 {
-  check_against_ode(build_locked, 9.81, 1e-5, 1e-4);
+  mechanism *ode = mechanism_new(row->build, row->gravity);
+  mechanism *loop = mechanism_running(row->build, row->gravity);
+  mechanism_difference d = mechanisms_compare(loop, ode, 1.0);
+  printf("# off by %.3g mm, %.3g mrad; open by %.3g mm\n", 1e3 * d.way, 1e3 * d.turn, 1e3 * d.open);
+  CHECK(d.way <= row->way);
+  CHECK(d.turn <= row->turn);
+  CHECK(d.open <= CLOSED);
+  check_owned(loop, moving_bodies(loop));
+  CHECK(cw_norm(loop->w.impulse) == 0.0); /* the hand touched nothing */
 }
 
 /* A whole turn and more: no stop is met where the angle goes from pi to -pi. */

@@ -13,6 +13,7 @@
 #include "base/clock.h"
 #include "tests/contact_world.h"
 #include "tests/owned_rig.h"
+#include "tests/solids.h"
 
 #define TICKS 1500
 #define SPEED 0.1 /* m/s, of the hand */
@@ -343,17 +344,10 @@ TEST(changes_no_bit_of_hulls_and_friction)
 /* A box that the hand holds comes down on a mesh in the static world; there are no bodies. */
 static void play_mesh(hap_model model, double lookback, course *out)
 {
-  static const double corners[] = {-0.3, -0.3, 0.0, 0.3, -0.3, 0.0, 0.3, 0.3, 0.0, -0.3, 0.3, 0.0};
-  static const dTriIndex triangles[] = {0, 1, 2, 0, 2, 3};
   double hull[24];
   contact_world *w = cw_new(CW_GRAVITY);
-  dTriMeshDataID data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 4, triangles, 6,
-                              3 * (int)sizeof(dTriIndex));
-  dCreateTriMesh(w->space, data, NULL, NULL, NULL);
-  for (int i = 0; i < 24; ++i) {
-    hull[i] = (i / 3 >> i % 3 & 1) != 0 ? RADIUS : -RADIUS;
-  }
+  mesh_floor(w->space);
+  box_corners(AT(RADIUS, RADIUS, RADIUS), AT(0.0, 0.0, 0.0), hull);
   w->def.model = model;
   w->expert.lookback = lookback;
   w->hand_def.hull_xyz = hull;
@@ -366,7 +360,6 @@ static void play_mesh(hap_model model, double lookback, course *out)
   cw_run(w, TICKS / 2);
   out->stats = cw_stats(w);
   cw_close(w);
-  dGeomTriMeshDataDestroy(data);
 }
 
 TEST(a_hull_may_touch_a_mesh_and_nothing_else)

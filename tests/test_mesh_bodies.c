@@ -8,6 +8,7 @@
 #include "tests/tap.h"
 
 #include "tests/contact_world.h"
+#include "tests/solids.h"
 
 #define BARS_MAX 4
 
@@ -24,33 +25,19 @@ static const bars sledge = {2,
                             {{0.05, 0.01, 0.015}, {0.05, 0.01, 0.015}}}; /* two runners */
 
 typedef struct solid {
-  dTriMeshDataID data;
-  double corners[8 * BARS_MAX * 3];
+  double corners[24 * BARS_MAX];
   dTriIndex triangles[36 * BARS_MAX];
 } solid;
 
-static void solid_fill(const bars *b, solid *out)
+static dGeomID solid_create(dSpaceID space, const bars *b, solid *s)
 {
-  static const int faces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
-                                  {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
-  dTriIndex *at = out->triangles;
   for (int n = 0; n < b->count; ++n) {
-    for (int i = 0; i < 8; ++i) {
-      for (int k = 0; k < 3; ++k) {
-        double side = ((i >> k) & 1) != 0 ? 1.0 : -1.0;
-        out->corners[3 * (8 * n + i) + k] = b->at[n][k] + side * b->half[n][k];
-      }
-    }
-    for (int f = 0; f < 6; ++f) {
-      static const int split[6] = {0, 1, 2, 0, 2, 3};
-      for (int k = 0; k < 6; ++k) {
-        *at++ = (dTriIndex)(8 * n + faces[f][split[k]]);
-      }
+    box_corners(b->half[n], b->at[n], s->corners + (size_t)24 * (size_t)n);
+    for (int i = 0; i < 36; ++i) {
+      s->triangles[36 * n + i] = (dTriIndex)(8 * n) + box_triangles[i];
     }
   }
-  out->data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(out->data, out->corners, 3 * sizeof(double), 8 * b->count,
-                              out->triangles, 36 * b->count, 3 * sizeof(dTriIndex));
+  return mesh_create(space, s->corners, 8 * b->count, s->triangles, 36 * b->count);
 }
 
 static dBodyID add_bars(contact_world *w, const bars *b, solid *mesh, const double at[3])
@@ -58,9 +45,7 @@ static dBodyID add_bars(contact_world *w, const bars *b, solid *mesh, const doub
   dMass mass;
   dMassSetBoxTotal(&mass, 0.5, 0.06, 0.06, 0.05);
   if (mesh != NULL) {
-    solid_fill(b, mesh);
-    return cw_add(w, dCreateTriMesh(w->space, mesh->data, NULL, NULL, NULL), &mass, at[0], at[1],
-                  at[2]);
+    return cw_add(w, solid_create(w->space, b, mesh), &mass, at[0], at[1], at[2]);
   }
   dBodyID body = cw_add(w, NULL, &mass, at[0], at[1], at[2]);
   for (int n = 0; n < b->count; ++n) {
@@ -86,17 +71,10 @@ typedef enum ground {
 static const char *const ground_names[] = {"plane", "box",  "rails", "balls",
                                            "drum",  "mesh", "field"};
 
-typedef struct ground_data {
-  dTriMeshDataID mesh;
-  dHeightfieldDataID field;
-} ground_data;
-
 /* All have their highest point at 0. */
-static void add_ground(contact_world *w, ground kind, ground_data *out)
+static void add_ground(contact_world *w, ground kind)
 {
-  static const double corners[] = {-0.4, -0.4, 0.0, 0.4, -0.4, 0.0, 0.4, 0.4, 0.0, -0.4, 0.4, 0.0};
-  static const dTriIndex triangles[] = {0, 1, 2, 0, 2, 3};
-  static double heights[49];
+  static grid level;
   dMatrix3 turned;
   switch (kind) {
     case GROUND_PLANE:
@@ -123,16 +101,11 @@ static void add_ground(contact_world *w, ground kind, ground_data *out)
       dGeomSetPosition(dCreateCylinder(w->space, 0.4, 0.1), 0.0, 0.0, -0.05);
       break;
     case GROUND_MESH:
-      out->mesh = dGeomTriMeshDataCreate();
-      dGeomTriMeshDataBuildDouble(out->mesh, corners, 3 * sizeof(double), 4, triangles, 6,
-                                  3 * sizeof(dTriIndex));
-      dCreateTriMesh(w->space, out->mesh, NULL, NULL, NULL);
+      mesh_floor(w->space);
       break;
     case GROUND_FIELD:
-      out->field = dGeomHeightfieldDataCreate();
-      dGeomHeightfieldDataBuildDouble(out->field, heights, 0, 0.8, 0.8, 7, 7, 1.0, 0.0, 1.0, 0);
-      dRFromAxisAndAngle(turned, 1.0, 0.0, 0.0, 0.5 * M_PI);
-      dGeomSetRotation(dCreateHeightfield(w->space, out->field, 1), turned);
+      grid_fill(&level, 6, 0.8 / 6.0, grid_level);
+      grid_field(w->space, &level);
       break;
     case GROUNDS:
       break;
@@ -152,13 +125,12 @@ typedef struct course {
 static void course_run(const bars *b, bool as_mesh, ground kind, double physics_hz, course *out)
 {
   static solid mesh;
-  ground_data ends = {NULL, NULL};
   contact_world w;
   cw_open(&w, CW_GRAVITY);
   w.def.physics_hz = physics_hz;
   const double half = b->half[0][2];
   add_bars(&w, b, as_mesh ? &mesh : NULL, (const double[3]){0.0, 0.0, half - 1e-4});
-  add_ground(&w, kind, &ends);
+  add_ground(&w, kind);
   const double side = b->at[0][1];
   cw_start(&w, -b->half[0][0] - 0.012, side, 0.8 * half);
   cw_move_hand(&w, 0.06, 0.0, 0.0);
@@ -171,15 +143,6 @@ static void course_run(const bars *b, bool as_mesh, ground kind, double physics_
   out->measured = stats.model.measured_bodies;
   memcpy(out->at, w.position[0], sizeof out->at);
   cw_close(&w);
-  if (as_mesh) {
-    dGeomTriMeshDataDestroy(mesh.data);
-  }
-  if (ends.mesh != NULL) {
-    dGeomTriMeshDataDestroy(ends.mesh);
-  }
-  if (ends.field != NULL) {
-    dGeomHeightfieldDataDestroy(ends.field);
-  }
 }
 
 static void course_compare(const bars *b, const char *name, ground kind, double hz)
@@ -255,6 +218,4 @@ TEST(two_crates_of_triangles_are_measured)
   CHECK(atomic_load(&said) == 1);
   cw_close(&w);
   CHECK(hap_hooks_set(NULL) == HAP_OK);
-  dGeomTriMeshDataDestroy(meshes[0].data);
-  dGeomTriMeshDataDestroy(meshes[1].data);
 }

@@ -7,6 +7,7 @@
 #include <tests/tap.h>
 
 #include <tests/physics_world.h>
+#include <tests/solids.h>
 
 #define RADIUS 0.01 /* m, of the pointer */
 
@@ -38,17 +39,6 @@ static void check_contact(const test_world *w, dBodyID body, const expectation *
 
 /* ---- geom classes ---- */
 
-/* Corners and faces of a box with half edges 0.05, 0.04, 0.03, for convex and trimesh. */
-static const dReal box_points[] = {-0.05, -0.04, -0.03, 0.05,  -0.04, -0.03, 0.05, 0.04,
-                                   -0.03, -0.05, 0.04,  -0.03, -0.05, -0.04, 0.03, 0.05,
-                                   -0.04, 0.03,  0.05,  0.04,  0.03,  -0.05, 0.04, 0.03};
-static const dReal box_planes[] = {1, 0,  0, 0.05, -1, 0, 0, 0.05, 0, 1, 0,  0.04,
-                                   0, -1, 0, 0.04, 0,  0, 1, 0.03, 0, 0, -1, 0.03};
-static const unsigned box_polygons[] = {4, 1, 2, 6, 5, 4, 0, 4, 7, 3, 4, 3, 7, 6, 2,
-                                        4, 0, 1, 5, 4, 4, 4, 5, 6, 7, 4, 0, 3, 2, 1};
-static const dTriIndex box_triangles[] = {1, 2, 6, 1, 6, 5, 0, 4, 7, 0, 7, 3, 3, 7, 6, 3, 6, 2,
-                                          0, 1, 5, 0, 5, 4, 4, 5, 6, 4, 6, 7, 0, 3, 2, 0, 2, 1};
-
 typedef enum shape {
   BOX,
   CONVEX,
@@ -63,15 +53,17 @@ static const char *const shape_names[] = {"box",    "convex",  "trimesh",
                                           "sphere", "capsule", "cylinder"};
 
 /* Each is 0.03 m high above its centre. */
-static dGeomID make_geom(dSpaceID space, shape kind, dTriMeshDataID mesh)
+static dGeomID make_geom(dSpaceID space, shape kind)
 {
+  static box_arrays box;
+  static const double half[3] = {0.05, 0.04, 0.03};
   switch (kind) {
     case BOX:
       return dCreateBox(space, 0.1, 0.08, 0.06);
     case CONVEX:
-      return dCreateConvex(space, box_planes, 6, box_points, 8, box_polygons);
+      return convex_box(space, &box, half);
     case TRIMESH:
-      return dCreateTriMesh(space, mesh, NULL, NULL, NULL);
+      return mesh_box(space, &box, half);
     case SPHERE:
       return dCreateSphere(space, 0.03);
     case CAPSULE:
@@ -82,16 +74,6 @@ static dGeomID make_geom(dSpaceID space, shape kind, dTriMeshDataID mesh)
       break;
   }
   return NULL;
-}
-
-static dTriMeshDataID make_mesh(void)
-{
-  static double vertices[24];
-  memcpy(vertices, box_points, sizeof vertices);
-  dTriMeshDataID mesh = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(mesh, vertices, 3 * sizeof(double), 8, box_triangles, 36,
-                              3 * sizeof(dTriIndex));
-  return mesh;
 }
 
 static void body_tilt(dBodyID body, const double away[3])
@@ -105,7 +87,6 @@ static void body_tilt(dBodyID body, const double away[3])
 static void check_shape(shape kind, bool turned)
 {
   dMass mass;
-  dTriMeshDataID mesh = make_mesh();
   const double apart = 0.004;
   double at[3] = {0.003, -0.002, 0.03 + RADIUS + apart};
   expectation e = {apart, {0, 0, 1}, 1e-9};
@@ -114,7 +95,7 @@ static void check_shape(shape kind, bool turned)
   }
   test_world *w = world_new(0.0, 20);
   dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
-  dBodyID body = world_add(w, make_geom(w->space, kind, mesh), &mass, 0, 0, 0);
+  dBodyID body = world_add(w, make_geom(w->space, kind), &mass, 0, 0, 0);
   if (turned) {
     body_tilt(body, (const double[3]){1.0, -2.0, 0.5});
     hapi_pose_point(dBodyGetPosition(body), dBodyGetQuaternion(body), at, at);
@@ -127,7 +108,6 @@ static void check_shape(shape kind, bool turned)
   const hapi_contact_slot *contact = world_contact(w, body, 0);
   CHECK(contact != NULL && world_contact_answer(w, contact)->probed);
   world_close(w);
-  dGeomTriMeshDataDestroy(mesh);
 }
 
 TEST(all_geom_classes_are_found)
@@ -144,17 +124,15 @@ TEST(edges_of_convex_and_trimesh)
   const double s = sqrt(0.5);
   for (int kind = BOX; kind <= TRIMESH; ++kind) {
     dMass mass;
-    dTriMeshDataID mesh = make_mesh();
     const double apart = RADIUS + 0.005;
     expectation e = {0.005, {s, 0, s}, 1e-7};
     printf("# %s\n", shape_names[kind]);
     test_world *w = world_new(0.0, 20);
     dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
-    dBodyID body = world_add(w, make_geom(w->space, (shape)kind, mesh), &mass, 0, 0, 0);
+    dBodyID body = world_add(w, make_geom(w->space, (shape)kind), &mass, 0, 0, 0);
     world_start(w, RADIUS, 0.05 + s * apart, 0.01, 0.03 + s * apart);
     check_contact(w, body, &e);
     world_close(w);
-    dGeomTriMeshDataDestroy(mesh);
   }
 }
 
@@ -162,10 +140,9 @@ TEST(a_free_trimesh_and_convex_have_the_accelerance_of_their_mass)
 {
   for (int kind = CONVEX; kind <= TRIMESH; ++kind) {
     dMass mass;
-    dTriMeshDataID mesh = make_mesh();
     test_world *w = world_new(0.0, 20);
     dMassSetBoxTotal(&mass, 0.3, 0.1, 0.08, 0.06);
-    dBodyID body = world_add(w, make_geom(w->space, (shape)kind, mesh), &mass, 0, 0, 0);
+    dBodyID body = world_add(w, make_geom(w->space, (shape)kind), &mass, 0, 0, 0);
     world_start(w, RADIUS, 0.01, 0.0, 0.03 + RADIUS + 0.002);
     const hapi_contact_slot *contact = world_contact(w, body, 0);
     REQUIRE(contact != NULL);
@@ -174,7 +151,6 @@ TEST(a_free_trimesh_and_convex_have_the_accelerance_of_their_mass)
     }
     CHECK_NEAR(world_contact_answer(w, contact)->a[4][2], -0.01 / mass.I[5], 1e-6 / mass.I[5]);
     world_close(w);
-    dGeomTriMeshDataDestroy(mesh);
   }
 }
 

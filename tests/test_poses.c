@@ -13,9 +13,6 @@
 
 #define H_MS 20 /* of the stage */
 
-static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                   HAP_MODEL_CONTACT};
-
 /* ---- scenes: what touches is drawn touching ---- */
 
 static void check_scene(const poses_def *def)
@@ -42,7 +39,7 @@ TEST(scenes_are_drawn_as_the_loop_had_them)
   static const double rates[] = {20.0, 60.0, 90.0};
   for (int i = 0; i < 2 * 4 * 3; ++i) {
     check_scene(&(poses_def){.scene = names[i / 12],
-                             .model = models[i / 3 % 4],
+                             .model = all_models[i / 3 % 4],
                              .physics_hz = rates[i % 3],
                              .frame_hz = 90.0,
                              .seconds = i < 12 ? 1.6 : 0.75});
@@ -231,7 +228,7 @@ static void check_comings_and_goings(hap_model model)
 TEST(bodies_come_into_the_local_world_and_leave_it_without_a_jump)
 {
   for (int i = 0; i < 4; ++i) {
-    check_comings_and_goings(models[i]);
+    check_comings_and_goings(all_models[i]);
   }
 }
 
@@ -357,7 +354,7 @@ TEST(growing_times_give_motion_that_neither_goes_back_nor_jumps)
 {
   for (int m = 0; m < 4; ++m) {
     stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
-    s->def.model = models[m];
+    s->def.model = all_models[m];
     dBodySetLinearVel(s->cube, 1.0, 0.0, 0.0);
     REQUIRE(stage_create(s) == HAP_OK && hap_session_start(s->session) == HAP_OK);
     int64_t time = 0;

@@ -218,10 +218,10 @@ static void errors_check(errors worst, const errors *bound, const char *a, const
   CHECK_SAY(good, "%s against %s: off the bounds", a, b);
 }
 
-static void errors_print(errors worst, const char *what, const char *a, const char *b)
+static void errors_print(errors worst, const char *a, const char *b)
 {
-  printf("# %-9s %-8s %-8s gap %.1e, certificate %.1e, surface %.1e, missed %.1e\n", what, a, b,
-         worst.gap, worst.certificate, worst.surface, worst.missed);
+  printf("# %-8s %-8s gap %.1e, certificate %.1e, surface %.1e, missed %.1e\n", a, b, worst.gap,
+         worst.certificate, worst.surface, worst.missed);
 }
 
 typedef struct run {
@@ -264,12 +264,43 @@ static void pair_run(const run *r, hapi_shape_kind kind_a, hapi_shape_kind kind_
     }
     errors_max(&worst, e);
   }
-  errors_print(worst, r->name, kind_names[kind_a], kind_names[kind_b]);
+  errors_print(worst, kind_names[kind_a], kind_names[kind_b]);
   errors_check(worst, rim_pair(kind_a, kind_b) ? &r->bound_rim : &r->bound, kind_names[kind_a],
                kind_names[kind_b]);
 }
 
-static void pairs_run(const run *r)
+static const run runs[] = {
+    {.name = "random_pairs",
+     .rounds = 300,
+     .far = 3.0,
+     .size_b = 1.0,
+     .search = true,
+     .bound = {1e-14, 1e-12, 1e-11, 1e-12},
+     .bound_rim = {1e-14, 1e-8, 1e-5, 1e-9}},
+    {.name = "deep_pairs",
+     .rounds = 300,
+     .far = 0.3,
+     .size_b = 1.0,
+     .search = true,
+     .bound = {1e-14, 1e-11, 1e-11, 1e-9},
+     .bound_rim = {1e-14, 1e-7, 1e-5, 1e-6}},
+    {.name = "small_against_large",
+     .rounds = 100,
+     .far = 0.02,
+     .size_b = 0.001,
+     .search = true,
+     .bound = {1e-14, 1e-9, 1e-9, 1e-9},
+     .bound_rim = {1e-14, 1e-9, 1e-5, 1e-9}},
+    {.name = "ten_kilometres_away",
+     .rounds = 100,
+     .far = 3.0,
+     .size_b = 1.0,
+     .offset = 1e4,
+     .bound = {1e-9, 1e-9, 1e-9, 0.0},
+     .bound_rim = {1e-9, 1e-8, 1e-5, 0.0}},
+};
+
+TEST_EACH(runs, const run *r)
 {
   uint64_t state = 20260101;
   for (int i = 0; i < PAIRS; ++i) {
@@ -279,54 +310,6 @@ static void pairs_run(const run *r)
       pair_run(r, a, b, &state);
     }
   }
-}
-
-TEST(random_pairs)
-{
-  static const run r = {.name = "random",
-                        .rounds = 300,
-                        .far = 3.0,
-                        .size_b = 1.0,
-                        .search = true,
-                        .bound = {1e-14, 1e-12, 1e-11, 1e-12},
-                        .bound_rim = {1e-14, 1e-8, 1e-5, 1e-9}};
-  pairs_run(&r);
-}
-
-TEST(deep_pairs)
-{
-  static const run r = {.name = "deep",
-                        .rounds = 300,
-                        .far = 0.3,
-                        .size_b = 1.0,
-                        .search = true,
-                        .bound = {1e-14, 1e-11, 1e-11, 1e-9},
-                        .bound_rim = {1e-14, 1e-7, 1e-5, 1e-6}};
-  pairs_run(&r);
-}
-
-TEST(small_against_large)
-{
-  static const run r = {.name = "small",
-                        .rounds = 100,
-                        .far = 0.02,
-                        .size_b = 0.001,
-                        .search = true,
-                        .bound = {1e-14, 1e-9, 1e-9, 1e-9},
-                        .bound_rim = {1e-14, 1e-9, 1e-5, 1e-9}};
-  pairs_run(&r);
-}
-
-TEST(ten_kilometres_away)
-{
-  static const run r = {.name = "10 km",
-                        .rounds = 100,
-                        .far = 3.0,
-                        .size_b = 1.0,
-                        .offset = 1e4,
-                        .bound = {1e-9, 1e-9, 1e-9, 0.0},
-                        .bound_rim = {1e-9, 1e-8, 1e-5, 0.0}};
-  pairs_run(&r);
 }
 
 /* --- relations between answers -------------------------------------------------------------- */
@@ -365,11 +348,6 @@ static void swap_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_t *
   for (int i = 0; i < 3 && one.distance > 1e-3; ++i) {
     CHECK_NEAR(one.normal[i], -other.normal[i], 1e-6);
   }
-}
-
-TEST(swapping_changes_roles_only)
-{
-  each_pair(swap_pair, 100);
 }
 
 static double largest_projection_error; /* m */
@@ -418,11 +396,6 @@ static void separate_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64
   CHECK_NEAR(free.distance, 1e-6, rim_pair(kind_a, kind_b) ? 1e-7 : 1e-9);
 }
 
-TEST(normal_leads_out)
-{
-  each_pair(separate_pair, 100);
-}
-
 /* Brings a to the gap along the normal of the answer. */
 static void move_to_gap(thing *a, const hapi_nearest *answer, double gap)
 {
@@ -464,11 +437,6 @@ static void approach_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64
   thing_approach(&a, &b, 1e-2, rim_pair(kind_a, kind_b) ? 1e-6 : 1e-10);
 }
 
-TEST(distance_follows_the_approach)
-{
-  each_pair(approach_pair, 100);
-}
-
 static void extreme_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_t *state)
 {
   thing a;
@@ -478,11 +446,6 @@ static void extreme_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_
   random_direction(state, a.pose.position);
   hapi_v3_scale(1000.0, a.pose.position, a.pose.position);
   thing_approach(&a, &b, 1e-3, rim_pair(kind_a, kind_b) ? 1e-5 : 1e-6);
-}
-
-TEST(millimetre_against_hundred_metres)
-{
-  each_pair(extreme_pair, 100);
 }
 
 static void core_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_t *state)
@@ -514,11 +477,6 @@ static void core_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_t *
   }
 }
 
-TEST(closed_forms_against_gjk)
-{
-  each_pair(core_pair, 300);
-}
-
 static void hull_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_t *state)
 {
   thing a;
@@ -536,11 +494,6 @@ static void hull_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_t *
   CHECK_NEAR(one.distance, other.distance, 1e-9);
 }
 
-TEST(box_and_hull_of_its_corners)
-{
-  each_pair(hull_pair, 200);
-}
-
 static void overlap_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_t *state)
 {
   thing a;
@@ -550,11 +503,6 @@ static void overlap_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_
   REQUIRE(nearest(&a, &b, &n));
   CHECK(hapi_overlap(&a.shape, &a.pose, &b.shape, &b.pose, n.distance + 1e-8));
   CHECK(!hapi_overlap(&a.shape, &a.pose, &b.shape, &b.pose, n.distance - 1e-8));
-}
-
-TEST(overlap_agrees_with_distance)
-{
-  each_pair(overlap_pair, 200);
 }
 
 static void coincident_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint64_t *state)
@@ -571,9 +519,26 @@ static void coincident_pair(hapi_shape_kind kind_a, hapi_shape_kind kind_b, uint
   CHECK(best_separation(&a, &b, state) < n.distance + 1e-6);
 }
 
-TEST(coincident_frames)
+typedef struct pair_relation {
+  const char *name;
+  pair_test *test;
+  int rounds;
+} pair_relation;
+
+static const pair_relation relations[] = {
+    {"swapping_changes_roles_only", swap_pair, 100},
+    {"normal_leads_out", separate_pair, 100},
+    {"distance_follows_the_approach", approach_pair, 100},
+    {"millimetre_against_hundred_metres", extreme_pair, 100},
+    {"closed_forms_against_gjk", core_pair, 300},
+    {"box_and_hull_of_its_corners", hull_pair, 200},
+    {"overlap_agrees_with_distance", overlap_pair, 200},
+    {"coincident_frames", coincident_pair, 20},
+};
+
+TEST_EACH(relations, const pair_relation *row)
 {
-  each_pair(coincident_pair, 20);
+  each_pair(row->test, row->rounds);
 }
 
 /* --- single cases --------------------------------------------------------------------------- */

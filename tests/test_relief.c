@@ -9,6 +9,7 @@
 #include "proximity/ball_among.h"
 #include "proximity/triangle.h"
 #include "tests/contact_world.h"
+#include "tests/solids.h"
 
 #define RADIUS 0.01
 
@@ -155,58 +156,9 @@ TEST(a_ball_that_is_pressed_through_hills_stays_above_them)
 
 /* ---- in a session ---- */
 
-#define GROUND 20
-#define GROUND_CELL 0.01
-
 static double ground_height(int i, int k)
 {
   return 0.004 * fabs(sin(0.9 * i + 0.3 * k)) + 0.002 * cos(1.7 * k);
-}
-
-typedef struct ground {
-  dHeightfieldDataID field;
-  dTriMeshDataID mesh;
-  double heights[(GROUND + 1) * (GROUND + 1)];
-  double vertices[(GROUND + 1) * (GROUND + 1) * 3];
-  dTriIndex indices[GROUND * GROUND * 6];
-} ground;
-
-static void ground_add_field(contact_world *w, ground *g)
-{
-  dMatrix3 upright;
-  for (int i = 0; i < (GROUND + 1) * (GROUND + 1); ++i) {
-    g->heights[i] = ground_height(i % (GROUND + 1), i / (GROUND + 1));
-  }
-  g->field = dGeomHeightfieldDataCreate();
-  dGeomHeightfieldDataBuildDouble(g->field, g->heights, 0, GROUND * GROUND_CELL,
-                                  GROUND * GROUND_CELL, GROUND + 1, GROUND + 1, 1.0, 0.0, 1.0, 0);
-  dGeomID geom = dCreateHeightfield(w->space, g->field, 1);
-  dRFromAxisAndAngle(upright, 1.0, 0.0, 0.0, 0.5 * M_PI);
-  dGeomSetRotation(geom, upright);
-}
-
-/* The same triangles. */
-static dGeomID ground_add_mesh(contact_world *w, ground *g)
-{
-  dTriIndex *at = g->indices;
-  for (int i = 0; i < (GROUND + 1) * (GROUND + 1); ++i) {
-    int x = i % (GROUND + 1);
-    int y = i / (GROUND + 1);
-    hapi_v3_set(&g->vertices[3 * i], GROUND_CELL * (x - GROUND / 2),
-                -GROUND_CELL * (y - GROUND / 2), ground_height(x, y));
-  }
-  for (int k = 0; k < GROUND; ++k) {
-    for (int i = 0; i < GROUND; ++i) {
-      dTriIndex a = (dTriIndex)(k * (GROUND + 1) + i);
-      const dTriIndex cell[6] = {a, a + GROUND + 1, a + 1, a + 1, a + GROUND + 1, a + GROUND + 2};
-      memcpy(at, cell, sizeof cell);
-      at += 6;
-    }
-  }
-  g->mesh = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildDouble(g->mesh, g->vertices, 3 * sizeof(double), (GROUND + 1) * (GROUND + 1),
-                              g->indices, GROUND * GROUND * 6, 3 * sizeof(dTriIndex));
-  return dCreateTriMesh(w->space, g->mesh, NULL, NULL, NULL);
 }
 
 typedef enum ground_kind {
@@ -220,7 +172,7 @@ typedef enum ground_kind {
 /* The force of a hand that goes over the ground, tick by tick. */
 static void ground_feel(ground_kind kind, double physics_hz, double friction, double out[TICKS][3])
 {
-  static ground g;
+  static grid ground;
   contact_world w;
   cw_open(&w, 0.0);
   w.def.physics_hz = physics_hz;
@@ -230,10 +182,11 @@ static void ground_feel(ground_kind kind, double physics_hz, double friction, do
   w.hand_def.friction = friction;
   w.hand_expert.coupling = HAP_COUPLING_DIRECT;
   cw_add_cube(&w, 1.0, 0.1, 5.0, 0.0, 0.0);
+  grid_fill(&ground, 20, 0.01, ground_height);
   if (kind == GROUND_FIELD) {
-    ground_add_field(&w, &g);
+    grid_field(w.space, &ground);
   } else {
-    dGeomID geom = ground_add_mesh(&w, &g);
+    dGeomID geom = grid_mesh(w.space, &ground);
     if (kind == GROUND_CARRIED) {
       dBodyID body = dBodyCreate(w.world);
       dBodySetKinematic(body);
@@ -251,11 +204,6 @@ static void ground_feel(ground_kind kind, double physics_hz, double friction, do
     memcpy(out[i], w.force, sizeof out[i]);
   }
   cw_close(&w);
-  if (kind == GROUND_FIELD) {
-    dGeomHeightfieldDataDestroy(g.field);
-  } else {
-    dGeomTriMeshDataDestroy(g.mesh);
-  }
 }
 
 /* The rate of the world does not show, and the ground's kind neither. */

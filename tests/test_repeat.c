@@ -8,6 +8,7 @@
 
 #include "tests/contact_world.h"
 #include "tests/repeat.h"
+#include "tests/solids.h"
 
 #define EDGE 0.1         /* m, of the cubes */
 #define SLAB 0.2         /* m, their ground is so thick */
@@ -88,18 +89,9 @@ static void replace_slab(scene *s)
 /* A cube as a convex geom, of two sizes. */
 static void add_convex(scene *s, int size)
 {
-  static const dReal planes[] = {1, 0,  0, 0.05, -1, 0, 0, 0.05, 0, 1, 0,  0.05,
-                                 0, -1, 0, 0.05, 0,  0, 1, 0.05, 0, 0, -1, 0.05};
-  static const unsigned polygons[] = {4, 1, 3, 7, 5, 4, 0, 4, 6, 2, 4, 2, 6, 7, 3,
-                                      4, 0, 1, 5, 4, 4, 4, 5, 7, 6, 4, 0, 2, 3, 1};
-  static dReal points[2][24];
-  for (int i = 0; i < 8; ++i) {
-    double half = 0.05 + 0.005 * size;
-    points[size][3 * i] = (i & 1) != 0 ? half : -half;
-    points[size][3 * i + 1] = (i & 2) != 0 ? half : -half;
-    points[size][3 * i + 2] = (i & 4) != 0 ? 0.05 : -0.05;
-  }
-  s->geoms[0] = dCreateConvex(s->w.space, planes, 6, points[size], 8, polygons);
+  static box_arrays boxes[2];
+  double half = 0.05 + 0.005 * size;
+  s->geoms[0] = convex_box(s->w.space, &boxes[size], AT(half, half, 0.05));
   dGeomSetBody(s->geoms[0], s->w.bodies[0]);
 }
 
@@ -227,11 +219,9 @@ static void run_case(repeat_log *log, const void *arg)
   if (c->begin != NULL) {
     c->begin(&s);
   }
-  double corners[8][3];
-  for (int i = 0; i < 24; ++i) {
-    corners[i / 3][i % 3] = (i / 3 >> i % 3 & 1) != 0 ? 0.01 : -0.01;
-  }
-  s.w.hand_def.hull_xyz = c->tool ? corners[0] : NULL;
+  double corners[24];
+  box_corners(AT(0.01, 0.01, 0.01), AT(0.0, 0.0, 0.0), corners);
+  s.w.hand_def.hull_xyz = c->tool ? corners : NULL;
   s.w.hand_def.hull_points = c->tool ? 8 : 0;
   s.w.hand_def.friction = c->tool ? 0.5 : 0.0;
   s.w.expert.lookback = c->lookback;

@@ -7,6 +7,7 @@
 #include "tests/tap.h"
 
 #include "tests/contact_world.h"
+#include "tests/solids.h"
 
 #define RADIUS 0.005
 #define K 1000.0
@@ -136,34 +137,22 @@ TEST(a_step_is_no_seam)
 
 /* Geoms that the loop cannot ask, and models that ask none: a plane for each between two syncs. */
 
-static const unsigned hull_faces[] = {4, 0, 2, 3, 1, 4, 4, 5, 7, 6, 4, 0, 1, 5, 4,
-                                      4, 2, 6, 7, 3, 4, 0, 4, 6, 2, 4, 1, 3, 7, 5};
-static const double hull_planes[] = {0, 0, -1, 0.05, 0,  0, 1, 0.05, 0, -1, 0, 0.05,
-                                     0, 1, 0,  0.05, -1, 0, 0, 0.05, 1, 0,  0, 0.05};
-
-static dGeomID add_hull(contact_world *w, double points[24], double x, double z)
+static void add_hull(contact_world *w, box_arrays *box, double x, double z)
 {
-  for (int i = 0; i < 24; ++i) {
-    points[i] = ((i / 3 >> i % 3) & 1) != 0 ? 0.05 : -0.05;
-  }
-  dGeomID geom = dCreateConvex(w->space, hull_planes, 6, points, 8, hull_faces);
-  dGeomSetPosition(geom, x, 0.0, z);
-  return geom;
+  dGeomSetPosition(convex_box(w->space, box, AT(0.05, 0.05, 0.05)), x, 0.0, z);
 }
 
 TEST(two_flush_hulls_push_once_in_every_model)
 {
-  static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                     HAP_MODEL_CONTACT};
-  static double points[2][24];
+  static box_arrays boxes[2];
   for (int m = 0; m < 4; ++m) {
     for (int hull = 0; hull < 2; ++hull) {
       contact_world w;
       open_world(&w, 0.0);
-      w.def.model = models[m];
+      w.def.model = all_models[m];
       if (hull != 0) {
-        (void)add_hull(&w, points[0], -0.05, -0.05);
-        (void)add_hull(&w, points[1], 0.05, -0.05);
+        add_hull(&w, &boxes[0], -0.05, -0.05);
+        add_hull(&w, &boxes[1], 0.05, -0.05);
       } else {
         (void)add_block(&w, -0.05, -0.05);
         (void)add_block(&w, 0.05, -0.05);

@@ -7,68 +7,11 @@
 #include "tests/tap.h"
 
 #include "tests/contact_world.h"
+#include "tests/solids.h"
 
 #define T 1e-3
 #define RADIUS 0.005
 #define K 1000.0
-
-typedef enum sheet_kind {
-  SHEET_BOX,
-  SHEET_CYLINDER,
-  SHEET_CONVEX,
-  SHEET_MESH,
-  SHEET_KINDS
-} sheet_kind;
-
-static const char *const kind_names[] = {"box", "cylinder", "convex", "mesh"};
-
-/* A plate of 0.2 m with its upper face at z = 0. Data of convex and mesh geoms outlive the geom. */
-typedef struct plate {
-  double points[24];
-  double planes[24];
-  dTriMeshDataID mesh;
-} plate;
-
-static const unsigned faces[] = {4, 0, 2, 3, 1, 4, 4, 5, 7, 6, 4, 0, 1, 5, 4,
-                                 4, 2, 6, 7, 3, 4, 0, 4, 6, 2, 4, 1, 3, 7, 5};
-static const dTriIndex triangles[] = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
-                                      2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
-
-static dGeomID plate_create(plate *p, dSpaceID space, sheet_kind kind, double thickness)
-{
-  static const double normals[6][3] = {{0, 0, -1}, {0, 0, 1},  {0, -1, 0},
-                                       {0, 1, 0},  {-1, 0, 0}, {1, 0, 0}};
-  double half[3] = {0.1, 0.1, 0.5 * thickness};
-  for (int i = 0; i < 8; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      p->points[3 * i + k] = ((i >> k) & 1) != 0 ? half[k] : -half[k];
-    }
-  }
-  for (int i = 0; i < 6; ++i) {
-    memcpy(p->planes + 4 * i, normals[i], sizeof normals[i]);
-    p->planes[4 * i + 3] = half[i < 2 ? 2 : i < 4 ? 1 : 0];
-  }
-  switch (kind) {
-    case SHEET_BOX:
-      return dCreateBox(space, 0.2, 0.2, thickness);
-    case SHEET_CYLINDER:
-      return dCreateCylinder(space, 0.1, thickness);
-    case SHEET_CONVEX:
-      return dCreateConvex(space, p->planes, 6, p->points, 8, faces);
-    default:
-      p->mesh = dGeomTriMeshDataCreate();
-      dGeomTriMeshDataBuildDouble(p->mesh, p->points, 3 * sizeof(double), 8, triangles, 36,
-                                  3 * sizeof(dTriIndex));
-      return dCreateTriMesh(space, p->mesh, NULL, NULL, NULL);
-  }
-}
-
-static void plate_destroy(plate *p)
-{
-  if (p->mesh != NULL) {
-    dGeomTriMeshDataDestroy(p->mesh);
-  }
-}
 
 typedef struct press {
   sheet_kind kind;
@@ -84,7 +27,7 @@ typedef struct press {
 static double press_error(const press *t, double *out_after)
 {
   contact_world w;
-  plate p = {.mesh = NULL};
+  box_arrays box;
   double worst = 0.0;
   cw_open(&w, 0.0);
   w.def.physics_hz = t->hz;
@@ -94,8 +37,7 @@ static double press_error(const press *t, double *out_after)
   w.hand_def.damping = 0.0;
   w.hand_expert.coupling = t->coupling;
   w.hand_expert.coupling_stiffness = K;
-  dGeomID geom = plate_create(&p, w.space, t->kind, t->thickness);
-  dGeomSetPosition(geom, 0.0, 0.0, -0.5 * t->thickness);
+  sheet_create(w.space, &box, t->kind, 0.2, t->thickness);
   cw_add_cube(&w, 1.0, 0.1, 5.0, 0.0, 0.0);
   cw_start(&w, 0.013, 0.007, RADIUS + 0.1);
   bool soft = t->coupling == HAP_COUPLING_PROXY;
@@ -123,7 +65,6 @@ static double press_error(const press *t, double *out_after)
   cw_run(&w, 100);
   *out_after = cw_norm(w.force);
   cw_close(&w);
-  plate_destroy(&p);
   return worst;
 }
 
@@ -135,7 +76,7 @@ static void check_press(const press *t)
   bool good = error < 0.3 && (after < 1e-9 || swings);
   if (!good) {
     printf("# %s of %g mm, coupling %d, model %d, %g Hz, %g m/s: %g N off, %g N after it\n",
-           kind_names[t->kind], 1e3 * t->thickness, (int)t->coupling, (int)t->model, t->hz,
+           sheet_names[t->kind], 1e3 * t->thickness, (int)t->coupling, (int)t->model, t->hz,
            t->speed, error, after);
   }
   CHECK(good);
@@ -145,12 +86,10 @@ static const double thicknesses[] = {0.0001, 0.001, 0.02};
 
 TEST(no_sheet_gives_way_to_a_slow_hand)
 {
-  static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                     HAP_MODEL_CONTACT};
   for (int kind = 0; kind < SHEET_KINDS; ++kind) {
     for (int m = 0; m < 4; ++m) {
       for (int i = 0; i < 3; ++i) {
-        press t = {(sheet_kind)kind, thicknesses[i], HAP_COUPLING_DIRECT, models[m], 60.0, 0.1};
+        press t = {(sheet_kind)kind, thicknesses[i], HAP_COUPLING_DIRECT, all_models[m], 60.0, 0.1};
         check_press(&t);
       }
     }
@@ -190,13 +129,13 @@ TEST(a_jump_through_a_plate_is_no_touch)
 {
   for (int kind = 0; kind < SHEET_KINDS; ++kind) {
     contact_world w;
-    plate p = {.mesh = NULL};
+    box_arrays box;
     cw_open(&w, 0.0);
     w.hand_def.radius = RADIUS;
     w.hand_def.stiffness = K;
     w.hand_def.damping = 0.0;
     w.hand_expert.coupling = HAP_COUPLING_DIRECT;
-    dGeomSetPosition(plate_create(&p, w.space, (sheet_kind)kind, 0.001), 0.0, 0.0, -0.0005);
+    sheet_create(w.space, &box, (sheet_kind)kind, 0.2, 0.001);
     cw_add_cube(&w, 1.0, 0.1, 5.0, 0.0, 0.0);
     cw_start(&w, 0.013, 0.007, RADIUS + 0.01);
     cw_move_hand(&w, 0.0, 0.0, -0.05);
@@ -210,6 +149,5 @@ TEST(a_jump_through_a_plate_is_no_touch)
     cw_run(&w, 300);
     CHECK_NEAR(cw_norm(w.force), 0.0, 1e-9);
     cw_close(&w);
-    plate_destroy(&p);
   }
 }

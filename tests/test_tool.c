@@ -8,9 +8,6 @@
 #define HALF 0.01 /* m, of the tool */
 #define K 1000.0
 
-static const hap_model all_models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                       HAP_MODEL_CONTACT};
-
 /* Flat above the floor, then down to a depth. */
 static void tool_press(tool_world *w, double depth, double angle)
 {
@@ -91,17 +88,6 @@ TEST(no_force_jumps_when_a_tool_tilts_through_flat)
   }
 }
 
-static dTriMeshDataID mesh_data; /* of the newest one */
-
-static void end_with_mesh(tool_world *w)
-{
-  tool_end(w);
-  if (mesh_data != NULL) {
-    dGeomTriMeshDataDestroy(mesh_data);
-  }
-  mesh_data = NULL;
-}
-
 typedef struct shape_case {
   const char *name;
   dGeomID (*make)(dSpaceID space);
@@ -155,27 +141,10 @@ static dGeomID make_plane(dSpaceID space)
 
 static dGeomID make_convex(dSpaceID space)
 {
-  static dReal planes[] = {1, 0,  0, 0.1, -1, 0, 0, 0.1, 0, 1, 0,  0.1,
-                           0, -1, 0, 0.1, 0,  0, 1, 0.1, 0, 0, -1, 0.1};
-  static dReal points[] = {0.1, 0.1, 0.1,  -0.1, 0.1, 0.1,  0.1, -0.1, 0.1,  -0.1, -0.1, 0.1,
-                           0.1, 0.1, -0.1, -0.1, 0.1, -0.1, 0.1, -0.1, -0.1, -0.1, -0.1, -0.1};
-  static unsigned polygons[] = {4, 0, 2, 6, 4, 4, 1, 5, 7, 3, 4, 0, 4, 5, 1,
-                                4, 2, 3, 7, 6, 4, 0, 1, 3, 2, 4, 4, 6, 7, 5};
-  dGeomID geom = dCreateConvex(space, planes, 6, points, 8, polygons);
+  static box_arrays box;
+  dGeomID geom = convex_box(space, &box, AT(0.1, 0.1, 0.1));
   dGeomSetPosition(geom, 0.0, 0.0, -0.1);
   return geom;
-}
-
-static dGeomID make_mesh(dSpaceID space)
-{
-  static float corners[] = {-0.2f, -0.2f, 0.0f, 0.2f,  -0.2f, 0.0f,
-                            0.2f,  0.2f,  0.0f, -0.2f, 0.2f,  0.0f};
-  static dTriIndex indices[] = {0, 1, 2, 0, 2, 3};
-  dTriMeshDataID data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildSingle(data, corners, 3 * sizeof(float), 4, indices, 6,
-                              3 * sizeof(dTriIndex));
-  mesh_data = data;
-  return dCreateTriMesh(space, data, NULL, NULL, NULL);
 }
 
 static const shape_case shapes[] = {
@@ -186,7 +155,7 @@ static const shape_case shapes[] = {
     {"lying cylinder", make_cylinder},
     {"upright cylinder", make_upright},
     {"convex", make_convex},
-    {"mesh", make_mesh},
+    {"mesh", mesh_floor},
 };
 
 /* Sharp and rounded tools, on each shape, in each model. */
@@ -210,7 +179,7 @@ TEST(every_shape_is_felt_with_the_stiffness)
                   shapes[i].name, rounded, (int)all_models[m], force[0], force[1], force[2],
                   w->state.wrench.torque[0], w->state.wrench.torque[1], w->state.wrench.torque[2],
                   w->state.contacts);
-        end_with_mesh(w);
+        tool_end(w);
       }
     }
   }
@@ -220,20 +189,16 @@ TEST(every_shape_is_felt_with_the_stiffness)
  * are. */
 static dGeomID make_fan(dSpaceID space)
 {
-  static float corners[9 * 3] = {0.003f, 0.001f, 0.0f};
+  static double corners[9 * 3] = {0.003, 0.001, 0.0};
   static dTriIndex indices[8 * 3];
   for (int i = 0; i < 8; ++i) {
-    corners[3 * (i + 1)] = 0.2f * cosf(0.785398f * (float)i);
-    corners[3 * (i + 1) + 1] = 0.2f * sinf(0.785398f * (float)i);
+    corners[3 * (i + 1)] = 0.2 * cos(0.785398 * i);
+    corners[3 * (i + 1) + 1] = 0.2 * sin(0.785398 * i);
     indices[3 * i] = 0;
     indices[3 * i + 1] = (dTriIndex)(i + 1);
     indices[3 * i + 2] = (dTriIndex)((i + 1) % 8 + 1);
   }
-  dTriMeshDataID data = dGeomTriMeshDataCreate();
-  dGeomTriMeshDataBuildSingle(data, corners, 3 * sizeof(float), 9, indices, 24,
-                              3 * sizeof(dTriIndex));
-  mesh_data = data;
-  return dCreateTriMesh(space, data, NULL, NULL, NULL);
+  return mesh_create(space, corners, 9, indices, 24);
 }
 
 TEST(seams_of_a_mesh_are_not_felt)
@@ -262,7 +227,7 @@ TEST(seams_of_a_mesh_are_not_felt)
              before, least, most);
       CHECK(least > 0.88 * before && most < 1.12 * before);
       CHECK(i == 1 || fabs(before - 1.0) < 1e-6);
-      end_with_mesh(w);
+      tool_end(w);
     }
   }
 }

@@ -357,15 +357,10 @@ TEST(points_that_leap_hold_where_they_are)
 TEST(a_mesh_holds_as_a_floor)
 {
   static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_ACCELERANCE, HAP_MODEL_CONTACT};
-  static const double corners[] = {-0.2, -0.2, 0.0, 0.2, -0.2, 0.0, 0.2, 0.2, 0.0, -0.2, 0.2, 0.0};
-  static const dTriIndex triangles[] = {0, 1, 2, 0, 2, 3};
   for (int m = 0; m < 3; ++m) {
     tool_world *w = tool_new(all[m]);
     w->tool_def.friction = MU;
-    dTriMeshDataID data = dGeomTriMeshDataCreate();
-    dGeomTriMeshDataBuildDouble(data, corners, 3 * (int)sizeof(double), 4, triangles, 6,
-                                3 * (int)sizeof(dTriIndex));
-    dCreateTriMesh(w->space, data, NULL, NULL, NULL);
+    mesh_floor(w->space);
     tool_start(w);
     tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
     tool_run(w, 40);
@@ -380,7 +375,6 @@ TEST(a_mesh_holds_as_a_floor)
     tool_move(w, 0.03, 0.004, HALF - DEEP, 0.0, 600);
     CHECK_NEAR(slip_of(w), MU * LOAD, 2e-3 * LOAD);
     tool_end(w);
-    dGeomTriMeshDataDestroy(data);
   }
 }
 
@@ -406,10 +400,8 @@ static void pointer_surface(void *user, hap_pointer_id pointer, dGeomID geom, do
  * between them. */
 TEST(each_geom_has_its_friction)
 {
-  static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                  HAP_MODEL_CONTACT};
   for (int m = 0; m < 4; ++m) {
-    tool_world *w = tool_new(all[m]);
+    tool_world *w = tool_new(all_models[m]);
     memset(&asked, 0, sizeof asked);
     asked.says[0] = 0.2;
     asked.says[1] = 0.8;
@@ -560,14 +552,12 @@ static double turn_on_edges(hap_model model, hap_guard guard, double *out_stored
 
 TEST(turning_on_edges_gives_no_energy)
 {
-  static const hap_model all[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                  HAP_MODEL_CONTACT};
   for (int m = 0; m < 4; ++m) {
     double stored;
-    double made = turn_on_edges(all[m], HAP_GUARD_MEASURE, &stored);
-    double given = turn_on_edges(all[m], HAP_GUARD_ON, &stored);
+    double made = turn_on_edges(all_models[m], HAP_GUARD_MEASURE, &stored);
+    double given = turn_on_edges(all_models[m], HAP_GUARD_ON, &stored);
     printf("# %s: %.4f mJ in a round without the observer, %.4f mJ with it, of %.3f mJ\n",
-           hap_model_name(all[m]), 1e3 * made, 1e3 * given, 1e3 * stored);
+           hap_model_name(all_models[m]), 1e3 * made, 1e3 * given, 1e3 * stored);
     CHECK(stored > 1e-3);
     CHECK(made < 0.01 * stored);
     CHECK(given < 0.01 * stored);

@@ -11,73 +11,11 @@
 #define HALF 0.005 /* m, of the cube that is the hull */
 #define K 1000.0
 
-typedef enum sheet_kind {
-  SHEET_BOX,
-  SHEET_CYLINDER,
-  SHEET_CONVEX,
-  SHEET_MESH,
-  SHEET_KINDS
-} sheet_kind;
-
-static const char *const kind_names[] = {"box", "cylinder", "convex", "mesh"};
-
-static const unsigned faces[] = {4, 0, 2, 3, 1, 4, 4, 5, 7, 6, 4, 0, 1, 5, 4,
-                                 4, 2, 6, 7, 3, 4, 0, 4, 6, 2, 4, 1, 3, 7, 5};
-static const dTriIndex triangles[] = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
-                                      2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
-
-/* Its data outlive the geom. */
-typedef struct sheet {
-  double points[24];
-  double planes[24];
-  dTriMeshDataID mesh;
-} sheet;
-
-/* 0.1 m wide, its upper side at z = 0. */
-static dGeomID sheet_add(sheet *s, tool_world *w, sheet_kind kind, double thick)
-{
-  static const double normals[6][3] = {{0, 0, -1}, {0, 0, 1},  {0, -1, 0},
-                                       {0, 1, 0},  {-1, 0, 0}, {1, 0, 0}};
-  const double half[3] = {0.05, 0.05, 0.5 * thick};
-  dGeomID geom = NULL;
-  memset(s, 0, sizeof *s);
-  for (int i = 0; i < 24; ++i) {
-    s->points[i] = ((i / 3 >> i % 3) & 1) != 0 ? half[i % 3] : -half[i % 3];
-  }
-  for (int i = 0; i < 6; ++i) {
-    memcpy(s->planes + 4 * i, normals[i], sizeof normals[i]);
-    s->planes[4 * i + 3] = half[i < 2 ? 2 : i < 4 ? 1 : 0];
-  }
-  if (kind == SHEET_BOX) {
-    geom = dCreateBox(w->space, 0.1, 0.1, thick);
-  } else if (kind == SHEET_CYLINDER) {
-    geom = dCreateCylinder(w->space, 0.05, thick);
-  } else if (kind == SHEET_CONVEX) {
-    geom = dCreateConvex(w->space, s->planes, 6, s->points, 8, faces);
-  } else {
-    s->mesh = dGeomTriMeshDataCreate();
-    dGeomTriMeshDataBuildDouble(s->mesh, s->points, 3 * sizeof(double), 8, triangles, 36,
-                                3 * sizeof(dTriIndex));
-    geom = dCreateTriMesh(w->space, s->mesh, NULL, NULL, NULL);
-  }
-  dGeomSetPosition(geom, 0.0, 0.0, -0.5 * thick);
-  return geom;
-}
-
-static void sheet_end(sheet *s)
-{
-  if (s->mesh != NULL) {
-    dGeomTriMeshDataDestroy(s->mesh);
-  }
-}
-
 static void world_begin(tool_world *w, hap_model model, double hz)
 {
-  static const double half[3] = {HALF, HALF, HALF};
-  static const double middle[3] = {0.0, 0.0, 0.0};
   tool_begin(w, model);
   dWorldSetGravity(w->world, 0.0, 0.0, 0.0);
-  tool_set_box(w, half, middle);
+  tool_set_box(w, AT(HALF, HALF, HALF), AT(0.0, 0.0, 0.0));
   w->def.physics_hz = hz;
   w->tool_def.stiffness = K;
   w->tool_def.damping = 0.0;
@@ -107,11 +45,11 @@ typedef struct press {
 static void check_press(const press *t)
 {
   tool_world w;
-  sheet s;
+  box_arrays box;
   world_begin(&w, t->model, 60.0);
   w.tool_expert.coupling = t->coupling;
   w.tool_expert.coupling_stiffness = K;
-  (void)sheet_add(&s, &w, t->kind, t->thick);
+  sheet_create(w.space, &box, t->kind, 0.1, t->thick);
   tool_go(&w, 0.003, 0.002, HALF + 0.1, 0.0);
   tool_start(&w);
   double stiffness = t->coupling == HAP_COUPLING_PROXY ? 0.5 * K : K;
@@ -124,24 +62,21 @@ static void check_press(const press *t)
   bool good = error < 0.3 && fabs(w.state.wrench.force[2]) < 1e-9;
   if (!good) {
     printf("# %s of %g mm, coupling %d, model %d, %g m/s: %g N off, %g N after it\n",
-           kind_names[t->kind], 1e3 * t->thick, (int)t->coupling, (int)t->model, t->speed, error,
+           sheet_names[t->kind], 1e3 * t->thick, (int)t->coupling, (int)t->model, t->speed, error,
            w.state.wrench.force[2]);
   }
   CHECK(good);
   tool_end(&w);
-  sheet_end(&s);
 }
 
 static const double thicknesses[] = {0.0001, 0.001, 0.02};
 
 TEST(no_sheet_gives_way_in_any_model)
 {
-  static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                     HAP_MODEL_CONTACT};
   for (int kind = 0; kind < SHEET_KINDS; ++kind) {
     for (int m = 0; m < 4; ++m) {
       for (int i = 0; i < 3; ++i) {
-        const press t = {(sheet_kind)kind, thicknesses[i], HAP_COUPLING_DIRECT, models[m], 0.1};
+        const press t = {(sheet_kind)kind, thicknesses[i], HAP_COUPLING_DIRECT, all_models[m], 0.1};
         check_press(&t);
       }
     }
@@ -176,9 +111,9 @@ TEST(a_jump_through_a_sheet_is_no_touch)
 {
   for (int kind = 0; kind < SHEET_KINDS; ++kind) {
     tool_world w;
-    sheet s;
+    box_arrays box;
     world_begin(&w, HAP_MODEL_CONTACT, 60.0);
-    (void)sheet_add(&s, &w, (sheet_kind)kind, 0.001);
+    sheet_create(w.space, &box, (sheet_kind)kind, 0.1, 0.001);
     tool_go(&w, 0.003, 0.002, HALF + 0.01, 0.0);
     tool_start(&w);
     tool_move(&w, 0.003, 0.002, HALF - 0.002, 0.0, 200);
@@ -189,7 +124,6 @@ TEST(a_jump_through_a_sheet_is_no_touch)
     tool_move(&w, 0.003, 0.002, -0.001 - HALF + 0.002, 0.0, 300); /* and presses from below */
     CHECK_NEAR(w.state.wrench.force[2], -2.0, 1e-6);
     tool_end(&w);
-    sheet_end(&s);
   }
 }
 
@@ -220,9 +154,9 @@ TEST(an_edge_is_a_way_round)
 {
   for (int kind = 0; kind < SHEET_KINDS; ++kind) {
     tool_world w;
-    sheet s;
+    box_arrays box;
     world_begin(&w, HAP_MODEL_CONTACT, 60.0);
-    (void)sheet_add(&s, &w, (sheet_kind)kind, 0.001);
+    sheet_create(w.space, &box, (sheet_kind)kind, 0.1, 0.001);
     tool_go(&w, 0.03, 0.0, HALF + 0.002, 0.0);
     tool_start(&w);
     tool_move(&w, 0.03, 0.0, -0.007, 0.0, 200); /* 12 mm deep, and under the sheet */
@@ -234,7 +168,6 @@ TEST(an_edge_is_a_way_round)
     CHECK_NEAR(w.state.wrench.force[2], 0.0, 1e-9);
     CHECK_NEAR(w.state.wrench.force[0], 0.0, 1e-9);
     tool_end(&w);
-    sheet_end(&s);
   }
 }
 
@@ -274,13 +207,11 @@ static double slide_error(tool_world *w, double mu, double turn)
 
 TEST(flush_boxes_push_once_in_every_model)
 {
-  static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
-                                     HAP_MODEL_CONTACT};
   for (int m = 0; m < 4; ++m) {
     for (int i = 0; i < 4; ++i) {
       tool_world w;
       double mu = i % 2 == 0 ? 0.0 : 0.5;
-      world_begin(&w, models[m], 60.0);
+      world_begin(&w, all_models[m], 60.0);
       w.tool_def.friction = mu;
       block_add(&w, -0.05, -0.05);
       block_add(&w, 0.05, -0.05);
@@ -364,24 +295,16 @@ TEST(both_sides_of_an_inner_corner_push)
 
 /* ---- heightfields ---- */
 
-#define CELLS 40
-
 /* Fine cells, pressed deep, and along: the triangles that are near stay few. */
 TEST(a_level_heightfield_holds)
 {
   static const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT};
-  static double heights[(CELLS + 1) * (CELLS + 1)];
+  static grid g;
   for (int m = 0; m < 2; ++m) {
     tool_world w;
-    dMatrix3 upright;
     world_begin(&w, models[m], 60.0);
-    dHeightfieldDataID data = dGeomHeightfieldDataCreate();
-    dGeomHeightfieldDataBuildDouble(data, heights, 0, 0.2, 0.2, CELLS + 1, CELLS + 1, 1.0, 0.0,
-                                    0.05, 0);
-    dGeomHeightfieldDataSetBounds(data, -0.1, 0.1);
-    dGeomID field = dCreateHeightfield(w.space, data, 1);
-    dRFromAxisAndAngle(upright, 1.0, 0.0, 0.0, 0.5 * 3.14159265358979323846);
-    dGeomSetRotation(field, upright);
+    grid_fill(&g, 40, 0.005, grid_level);
+    grid_field(w.space, &g);
     tool_go(&w, 0.0013, 0.0027, 0.02, 0.0);
     tool_start(&w);
     tool_move(&w, 0.0013, 0.0027, HALF - 0.02, 0.0, 350);
@@ -390,6 +313,5 @@ TEST(a_level_heightfield_holds)
     tool_move(&w, 0.01, 0.0027, HALF - 0.02, 0.0, 100);
     CHECK(w.steepest < 1e-6);
     tool_end(&w);
-    dGeomHeightfieldDataDestroy(data);
   }
 }

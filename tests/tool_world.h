@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "tests/ode_world.h"
+#include "tests/solids.h"
 
 typedef struct tool_world {
   dWorldID world;
@@ -47,11 +48,7 @@ static inline bool tool_surface(void *user, dGeomID a, dGeomID b, dSurfaceParame
 /* Corners of a box about (x, y, z). */
 static inline void tool_set_box(tool_world *w, const double half[3], const double middle[3])
 {
-  for (int i = 0; i < 8; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      w->hull[3 * i + k] = middle[k] + ((i >> k & 1) != 0 ? half[k] : -half[k]);
-    }
-  }
+  box_corners(half, middle, w->hull);
   w->tool_def.hull_xyz = w->hull;
   w->tool_def.hull_points = 8;
 }

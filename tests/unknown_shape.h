@@ -8,8 +8,7 @@
 
 #include <ode/ode.h>
 
-/* Its data are to be destroyed after the geom. */
-static inline dHeightfieldDataID add_unknown_shape(dSpaceID space, dBodyID body)
+static inline void add_unknown_shape(dSpaceID space, dBodyID body)
 {
   static const double heights[] = {0.0, 0.0, 0.0, 0.0};
   dHeightfieldDataID data = dGeomHeightfieldDataCreate();
@@ -18,7 +17,6 @@ static inline dHeightfieldDataID add_unknown_shape(dSpaceID space, dBodyID body)
   dGeomSetCategoryBits(geom, 0);
   dGeomSetCollideBits(geom, 0);
   dGeomSetBody(geom, body);
-  return data;
 }
 
 #endif

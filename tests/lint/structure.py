@@ -38,10 +38,11 @@ def is_universal():
 
 
 def tags_of(root, files):
-    # ctags expands no macro by itself: TEST(name) of tests/tap.h defines a function of that name
+    # ctags expands no macro by itself: TEST and TEST_EACH of tests/tap.h define functions
     command = ["ctags", "--options=NONE", "--languages=C", "--langmap=C:.c.h", "--kinds-C=fm",
                "-D", "HAP_BEGIN_DECLS=", "-D", "HAP_END_DECLS=", "-I", "HAP_API,HAP_NODISCARD",
-               "-D", "TEST(name)=static void name(void)", "--fields=+nszZSf",
+               "-D", "TEST(name)=static void name(void)",
+               "-D", "TEST_EACH(table, row)=static void test_each_row(row)", "--fields=+nszZSf",
                "--output-format=json", "--sort=no", "-f", "-", "-L", "-"]
     run = subprocess.run(command, cwd=root, input="\n".join(files) + "\n", capture_output=True,
                          text=True, check=True)
