@@ -324,6 +324,46 @@ TEST(fair_lock_goes_on_behind_one_who_gave_up)
   hapi_fair_lock_finish(&c.lock);
 }
 
+static void *take_and_end(void *lock)
+{
+  CHECK(hapi_fair_lock_take(lock, INT64_MAX));
+  return NULL;
+}
+
+static void *take_for_good(void *lock)
+{
+  return hapi_fair_lock_take(lock, INT64_MAX) ? lock : NULL;
+}
+
+TEST(fair_lock_of_a_thread_that_ended_goes_to_the_next)
+{
+  hapi_fair_lock lock;
+  pthread_t thread;
+  void *had = NULL;
+  REQUIRE(hapi_fair_lock_init(&lock));
+  for (int i = 0; i < 3; ++i) {
+    REQUIRE(pthread_create(&thread, NULL, take_and_end, &lock) == 0);
+    pthread_join(thread, NULL);
+    CHECK(!hapi_fair_lock_is_mine(&lock));
+    CHECK(hapi_fair_lock_take(&lock, i == 0 ? 0 : INT64_MAX)); /* seen at once */
+    CHECK(hapi_fair_lock_is_mine(&lock));
+    hapi_fair_lock_give(&lock);
+  }
+  /* while somebody waits; and the next thread may have the name of the one that ended */
+  REQUIRE(hapi_fair_lock_take(&lock, INT64_MAX));
+  REQUIRE(pthread_create(&thread, NULL, take_for_good, &lock) == 0);
+  wait_for_waiters(&lock, 1);
+  hapi_fair_lock_give(&lock);
+  pthread_join(thread, &had);
+  CHECK(had == &lock);
+  REQUIRE(pthread_create(&thread, NULL, take_for_good, &lock) == 0);
+  pthread_join(thread, &had);
+  CHECK(had == &lock);
+  CHECK(hapi_fair_lock_take(&lock, hapi_clock_now() + 10 * MS));
+  hapi_fair_lock_give(&lock);
+  hapi_fair_lock_finish(&lock);
+}
+
 /* ---- threads ---- */
 
 static void *say_done(void *arg)

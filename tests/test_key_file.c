@@ -121,16 +121,17 @@ TEST(what_cannot_be_read_says_why)
   heard h = {"", NULL};
   hap_detail detail = {""};
   hapi_key_file none = {.path = "/nowhere/at/all", .detail = &detail};
-  hapi_key_file folder = {.path = "/tmp", .detail = &detail};
+  hapi_key_file folder = {.path = "/proc/self/mem", .detail = &detail};
   hapi_key_file quiet = {.path = "/nowhere/at/all"};
   CHECK(hapi_key_file_read(&none, line_take, &h) == HAP_ERROR_IO);
   CHECK(strstr(detail.text, "/nowhere/at/all: cannot be opened: ") != NULL);
   CHECK(hapi_key_file_read(&folder, line_take, &h) == HAP_ERROR_IO);
-  CHECK(strstr(detail.text, "/tmp, line 1: cannot be read: ") != NULL);
+  CHECK(strstr(detail.text, "/proc/self/mem, line 1: cannot be read: ") != NULL);
   CHECK(hapi_key_file_read(&quiet, line_take, &h) == HAP_ERROR_IO);
   folder.line = 7;
   CHECK(hapi_key_file_lacks(&folder, "of.", "it") == HAP_ERROR_FORMAT);
-  CHECK(strcmp(detail.text, "/tmp, line 7: the file ends without a line of.it = ...") == 0);
+  CHECK(strcmp(detail.text, "/proc/self/mem, line 7: the file ends without a line of.it = ...") ==
+        0);
 }
 
 SET_UP

@@ -168,6 +168,64 @@ TEST(a_session_is_destroyed_by_the_thread_that_has_its_lock)
   stage_end(s); /* would wait for ever */
 }
 
+static void *lock_and_end(void *session)
+{
+  return hap_session_lock(session) == HAP_OK ? session : NULL;
+}
+
+/* Physics goes on, and destroy comes back. */
+TEST(a_lock_does_not_die_with_its_thread)
+{
+  pthread_t thread;
+  void *had = NULL;
+  stage *s = stage_new(HAP_DRIVE_THREADS);
+  REQUIRE(stage_create(s) == HAP_OK);
+  CHECK(hap_session_start(s->session) >= HAP_OK);
+  for (int i = 0; i < 2; ++i) {
+    REQUIRE(pthread_create(&thread, NULL, lock_and_end, s->session) == 0);
+    pthread_join(thread, &had);
+    CHECK(had == s->session);
+    int steps = atomic_load(&s->steps);
+    for (int ms = 0; ms < 5000 && i == 0 && atomic_load(&s->steps) < steps + 3; ++ms) {
+      hapi_clock_sleep_until(hapi_clock_now() + MS);
+    }
+    CHECK(i > 0 || atomic_load(&s->steps) >= steps + 3);
+  }
+  stage_end(s);
+}
+
+/* The text is that of the last error, never of an older one. */
+TEST(an_error_has_its_own_text)
+{
+  hap_detail text;
+  hap_pose pose;
+  hap_stats stats;
+  hap_pointer_id nobody = {77};
+  stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
+  dBodyID stranger = dBodyCreate(s->world);
+#define HAS_TEXT(call, said)                                                \
+  do {                                                                      \
+    CHECK(hap_session_set_time_scale(s->session, -1.0) < HAP_OK);           \
+    CHECK((call) < HAP_OK);                                                 \
+    CHECK(hap_session_detail(s->session, &text) == HAP_OK);                 \
+    CHECK_SAY(strstr(text.text, said) != NULL, "%s: %s", #call, text.text); \
+  } while (0)
+  HAS_TEXT(hap_session_post(s->session, NULL, NULL), "hap_session_post: an argument is NULL");
+  HAS_TEXT(hap_session_set_model(s->session, (hap_model)77), "hap_session_set_model: ");
+  HAS_TEXT(hap_session_adopt_body(s->session, NULL), "an argument is NULL");
+  HAS_TEXT(hap_session_forget_body(s->session, stranger), "hap_session_forget_body: ");
+  HAS_TEXT(hap_session_poses(s->session, 0, &stranger, 1, NULL), "hap_session_poses: ");
+  HAS_TEXT(hap_session_poses_now(s->session, NULL, 1, &pose), "hap_session_poses_now: ");
+  HAS_TEXT(hap_session_trace_bodies(s->session, NULL, 1), "an argument is NULL");
+  HAS_TEXT(hap_session_stats(s->session, &stats, 0), "hap_session_stats: ");
+  HAS_TEXT(hap_session_unlock(s->session), "does not have the lock");
+  HAS_TEXT(hap_pointer_poses(s->session, nobody, 0, &pose, NULL), "no pointer with the id");
+  HAS_TEXT(hap_pointer_set_target(s->session, nobody, NULL, NULL), "hap_pointer_set_target: ");
+#undef HAS_TEXT
+  CHECK(hap_session_reset_fault(s->session) == HAP_OK);
+  CHECK(hap_session_detail(s->session, &text) == HAP_OK && text.text[0] == '\0');
+}
+
 static bool bad_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
 {
   (void)user;

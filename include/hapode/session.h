@@ -77,7 +77,9 @@ HAP_API void hap_session_def_init(hap_session_def *def, size_t size_of_def);
 
 /* [control] Stops, writes zero force to every device, and frees. NULL is allowed. A lock that this
  * thread holds is released. Posted edits that still wait are run. The world goes back to the
- * application as it is, with ODE's auto-disable as it was found. In a callback it does nothing. */
+ * application as it is, with ODE's auto-disable as it was found. In a callback it does nothing.
+ * Before dWorldDestroy, dSpaceDestroy and dCloseODE: a session whose world is gone reads freed
+ * memory, and nothing can tell it so. */
 HAP_API void hap_session_destroy(hap_session *session);
 
 /* ---- running ---- */
@@ -133,7 +135,8 @@ HAP_NODISCARD HAP_API hap_status hap_session_set_time_scale(hap_session *session
  * session plays a recording. */
 HAP_API hap_status hap_session_reset_fault(hap_session *session);
 
-/* [any] Text of the last error or fault of this session; "" when there was none. */
+/* [any] Text of the last error or fault of this session, by whichever thread; "" when there was
+ * none, and after hap_session_reset_fault. A latched fault comes before errors. */
 HAP_API hap_status hap_session_detail(const hap_session *session, hap_detail *out);
 
 /* [any] Name of a model as programs spell it ("accelerance"); NULL for an unknown value. */
@@ -144,7 +147,8 @@ HAP_API const char *hap_model_name(hap_model model);
 /* [app] Between lock and unlock this thread alone may touch the ODE world. Threads are served in
  * order of arrival. The wait is for one physics step at most, and for the threads that are served
  * before. Not recursive. Physics waits while the lock is held (hap_stats.edits.held_ms_max), the
- * haptic loop does not. Legal before start and after stop.
+ * haptic loop does not. Legal before start and after stop. A thread that ends with the lock loses
+ * it: the next one has it within 0.1 s, and that is logged as an error.
  *
  * HAP_ERROR_THREAD, with a text: this thread has the lock, or it is in a callback or a posted edit,
  * where the world may be touched without it. */

@@ -6,7 +6,7 @@
 /* A lock between the physics thread and the application. With a plain mutex a busy physics thread
  * would take it again before a waiting application wakes up. Here the thread that waited longest is
  * next. Any number of threads may wait: a place in the queue is on the stack of the thread that
- * waits. */
+ * waits. A thread that ends with the lock loses it to the next one within 0.1 s. That is logged. */
 
 #include <pthread.h>
 #include <stdbool.h>
@@ -21,7 +21,9 @@ typedef struct hapi_fair_lock {
   struct hapi_fair_waiter *last;
   unsigned count; /* that wait */
   bool held;
+  bool lost; /* by a thread that ended, which is still to be logged */
   pthread_t holder;
+  pthread_mutex_t life; /* robust; the holder has it, so the system tells when that thread ends */
 } hapi_fair_lock;
 
 bool hapi_fair_lock_init(hapi_fair_lock *lock);

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "base/thread.h"
 
+#include <errno.h>
 #include <sched.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -42,7 +43,9 @@ hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *a
   HAPI_ASSERT(!thread->running && priority >= 0 && priority <= 99);
   bool realtime = priority > 0 && thread_create(thread, main, arg, priority) == 0;
   atomic_store(&thread->realtime, realtime);
-  if (!realtime && thread_create(thread, main, arg, 0) != 0) {
+  int failed = realtime ? 0 : thread_create(thread, main, arg, 0);
+  if (failed != 0) {
+    errno = failed;
     return HAP_ERROR_SYSTEM;
   }
   thread->running = true;

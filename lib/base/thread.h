@@ -19,7 +19,7 @@ typedef struct hapi_thread {
 } hapi_thread;
 
 /* Starts main(arg). priority 1..99 asks for SCHED_FIFO and goes on without it when that is not
- * allowed. name: at most 15 characters are shown. */
+ * allowed. name: at most 15 characters are shown. HAP_ERROR_SYSTEM: errno says why. */
 hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *arg,
                              const char *name, int priority);
 void hapi_thread_join(hapi_thread *thread); /* idempotent */

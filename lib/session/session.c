@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "session/session_internal.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -46,6 +47,13 @@ hap_status hapi_session_note(const hap_session *session, hap_status status,
                              const hap_detail *detail)
 {
   return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail->text) : status;
+}
+
+hap_status hapi_session_say(const hap_session *session, hap_status status, const char *call)
+{
+  return session != NULL && status < HAP_OK
+             ? hapi_session_fail(session, status, "%s: %s", call, hap_status_text(status))
+             : status;
 }
 
 hap_status hapi_session_may_change(const hap_session *session)
@@ -96,15 +104,20 @@ static bool may_run(hap_session *session)
 
 static hap_status start_threads(hap_session *session)
 {
+  const char *which = "haptic";
   hap_status status = hapi_haptic_start_thread(session->haptic);
   if (status >= HAP_OK && session->def.drive == HAP_DRIVE_THREADS) {
+    which = "physics";
     status = hapi_physics_start_thread(session->physics);
   }
   if (status >= HAP_OK) {
+    which = "contact";
     status = hapi_contact_start_thread(session->contact);
   }
   if (status < HAP_OK) {
-    return hapi_session_fail(session, status, "a thread could not be started");
+    return hapi_session_fail(
+        session, status, "the %s thread could not be started: %s%s", which, strerror(errno),
+        errno == EAGAIN ? " (a limit of threads or memory: ulimit -u, -v)" : "");
   }
   bool wanted = session->def.rt_priority > 0;
   bool given = hapi_haptic_is_realtime(session->haptic) && session->memory_locked;
@@ -351,7 +364,7 @@ static hap_status say_why_not_locked(hap_session *session, hap_status status)
                                  : "lock by a thread that has the lock already: it is not "
                                    "recursive, unlock first");
   }
-  return status;
+  return hapi_session_say(session, status, "hap_session_try_lock");
 }
 
 hap_status hap_session_lock(hap_session *session)
@@ -387,7 +400,7 @@ hap_status hap_session_unlock(hap_session *session)
 hap_status hap_session_post(hap_session *session, hap_edit_fn edit, void *arg)
 {
   if (session == NULL || edit == NULL) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   hap_status status = hapi_physics_post(session->physics, edit, arg);
   if (status == HAP_ERROR_CAPACITY) {
@@ -406,7 +419,7 @@ hap_status hap_session_set_model(hap_session *session, hap_model model)
 {
   HAPI_TRY(hapi_session_may_change(session));
   if ((int)model < 0 || hap_model_name(model) == NULL) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   hapi_physics_set_model(session->physics, model);
   return HAP_OK;
@@ -456,6 +469,7 @@ hap_status hap_session_reset_fault(hap_session *session)
 {
   HAPI_TRY(hapi_session_may_change(session));
   hapi_haptic_reset_fault(session->haptic);
+  (void)hapi_session_fail(session, HAP_OK, "%s", ""); /* a fault of the world has its text there */
   return HAP_OK;
 }
 
@@ -470,13 +484,14 @@ hap_status hap_session_stats(const hap_session *session, hap_stats *out, size_t 
   hapi_physics_stats(session->physics, &stats);
   hapi_haptic_stats(session->haptic, &stats);
   hapi_contact_stats(session->contact, &stats);
-  return hapi_struct_give(&stats, sizeof stats, out, size_of_out);
+  return hapi_session_say(session, hapi_struct_give(&stats, sizeof stats, out, size_of_out),
+                          __func__);
 }
 
 hap_status hap_session_detail(const hap_session *session, hap_detail *out)
 {
   if (session == NULL || out == NULL) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   hap_stats stats;
   hap_session *s = (hap_session *)(uintptr_t)session;
@@ -506,7 +521,7 @@ hap_status hap_session_trace_read(hap_session *session, hap_trace_row *rows, siz
                                   size_t size_of_row, size_t *out_count)
 {
   if (session == NULL || rows == NULL || out_count == NULL || size_of_row < sizeof rows->tick) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   *out_count = hapi_haptic_read_trace(session->haptic, rows, capacity, size_of_row);
   return *out_count == 0 ? HAP_END : HAP_OK;
@@ -516,7 +531,7 @@ hap_status hap_session_black_box(hap_session *session, hap_black_box_row *rows, 
                                  size_t size_of_row, size_t *out_count)
 {
   if (session == NULL || rows == NULL || out_count == NULL || size_of_row < sizeof rows->tick) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   *out_count = hapi_haptic_read_black_box(session->haptic, rows, capacity, size_of_row);
   return *out_count == 0 ? HAP_END : HAP_OK;

@@ -111,5 +111,6 @@ hap_status hap_session_accuracy(const hap_session *session, hap_accuracy_info *o
     return HAP_ERROR_ARGUMENT;
   }
   hapi_physics_accuracy(session->physics, &info);
-  return hapi_struct_give(&info, sizeof info, out, size_of_out);
+  return hapi_session_say(session, hapi_struct_give(&info, sizeof info, out, size_of_out),
+                          __func__);
 }

@@ -195,7 +195,7 @@ hap_status hap_session_effects(const hap_session *session, hap_effect_info *out,
 {
   hap_effect_info all[HAP_EFFECTS];
   if (session == NULL || out == NULL || count > HAP_EFFECTS || size_of_one < sizeof out->size) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   size_t size = size_of_one < sizeof all[0] ? size_of_one : sizeof all[0];
   memset(all, 0, sizeof all);

@@ -57,6 +57,9 @@ hap_status hapi_session_fail(const hap_session *session, hap_status status, cons
 /* The same with the detail of a failed check; nothing where the status is none. */
 hap_status hapi_session_note(const hap_session *session, hap_status status,
                              const hap_detail *detail);
+/* The text of an error that has none of its own: else it would be that of an older one. call: the
+ * function's name. Where session is NULL, and for what is no error, nothing. */
+hap_status hapi_session_say(const hap_session *session, hap_status status, const char *call);
 /* HAP_ERROR_ARGUMENT: NULL. HAP_ERROR_STATE: it plays a recording, and what happened is in it. */
 hap_status hapi_session_may_change(const hap_session *session);
 /* What create has made; stopped before. */

@@ -196,7 +196,7 @@ hap_status hap_session_create(const hap_session_def *def, const hap_ode_def *ode
 static hap_status may_edit(hap_session *session, const void *object)
 {
   if (session == NULL || object == NULL) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   if (!hapi_physics_may_edit(session->physics)) {
     return hapi_session_fail(session, HAP_ERROR_THREAD, "%s",
@@ -211,13 +211,13 @@ static hap_status may_edit(hap_session *session, const void *object)
 hap_status hap_session_adopt_body(hap_session *session, dBodyID body)
 {
   HAPI_TRY(may_edit(session, body));
-  return hapi_physics_adopt(session->physics, body);
+  return hapi_session_say(session, hapi_physics_adopt(session->physics, body), __func__);
 }
 
 hap_status hap_session_forget_body(hap_session *session, dBodyID body)
 {
   HAPI_TRY(may_edit(session, body));
-  return hapi_physics_forget(session->physics, body);
+  return hapi_session_say(session, hapi_physics_forget(session->physics, body), __func__);
 }
 
 hap_status hap_session_forget_geom(hap_session *session, dGeomID geom)
@@ -231,29 +231,33 @@ hap_status hap_session_set_moved_callback(hap_session *session, dBodyID body,
                                           void (*callback)(dBodyID))
 {
   HAPI_TRY(may_edit(session, body));
-  return hapi_physics_set_moved_callback(session->physics, body, callback);
+  return hapi_session_say(
+      session, hapi_physics_set_moved_callback(session->physics, body, callback), __func__);
 }
 
 hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyID *bodies,
                              size_t count, hap_pose *out)
 {
   if (session == NULL || (count > 0 && (bodies == NULL || out == NULL))) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
-  return hapi_physics_poses(session->physics, time_ns, bodies, count, out);
+  return hapi_session_say(
+      session, hapi_physics_poses(session->physics, time_ns, bodies, count, out), __func__);
 }
 
 hap_status hap_session_poses_now(hap_session *session, const dBodyID *bodies, size_t count,
                                  hap_pose *out)
 {
   if (session == NULL || (count > 0 && (bodies == NULL || out == NULL))) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
-  return hapi_physics_poses_now(session->physics, bodies, count, out);
+  return hapi_session_say(session, hapi_physics_poses_now(session->physics, bodies, count, out),
+                          __func__);
 }
 
 hap_status hap_session_trace_bodies(hap_session *session, const dBodyID *bodies, size_t count)
 {
   HAPI_TRY(may_edit(session, bodies));
-  return hapi_physics_trace_bodies(session->physics, bodies, count);
+  return hapi_session_say(session, hapi_physics_trace_bodies(session->physics, bodies, count),
+                          __func__);
 }

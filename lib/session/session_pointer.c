@@ -103,7 +103,7 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
 {
   HAPI_TRY(hapi_session_may_change(session));
   if (out == NULL) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   hap_detail detail = {""};
   hapi_pointer_setup setup;
@@ -157,7 +157,7 @@ hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
 {
   HAPI_TRY(hapi_session_may_change(session));
   if (pose == NULL) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   if (!pose_is_good(pose)) {
     return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
@@ -178,7 +178,7 @@ hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64
 {
   hap_pose poses[2];
   if (session == NULL || (out_proxy == NULL && out_device == NULL)) {
-    return HAP_ERROR_ARGUMENT;
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   int64_t drawn_ns = hapi_physics_drawn_time(session->physics, time_ns);
   int64_t step_ns = (int64_t)(1e9 / session->def.physics_hz);
@@ -189,7 +189,7 @@ hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64
   if (status >= HAP_OK && out_device != NULL) {
     *out_device = poses[1];
   }
-  return status;
+  return say_why_not(session, pointer, status);
 }
 
 hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
@@ -199,7 +199,8 @@ hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
   if (session == NULL) {
     return HAP_ERROR_ARGUMENT;
   }
-  hap_status status = hapi_haptic_get_pointer(session->haptic, pointer, &state);
-  return status >= HAP_OK ? hapi_struct_give(&state, sizeof state, out, size_of_out)
-                          : say_why_not(session, pointer, status);
+  HAPI_TRY(
+      say_why_not(session, pointer, hapi_haptic_get_pointer(session->haptic, pointer, &state)));
+  return hapi_session_say(session, hapi_struct_give(&state, sizeof state, out, size_of_out),
+                          __func__);
 }

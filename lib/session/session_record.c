@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include <assert.h>
+#include <errno.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -171,7 +172,8 @@ hap_status hapi_record_begin(hap_session *session, hap_detail *detail)
     tapes[i] = hapi_recorder_tape(session->recorder, (hapi_stream)i);
   }
   if (hapi_recorder_start(session->recorder) < HAP_OK) {
-    return hapi_fail(detail, HAP_ERROR_SYSTEM, "the thread of the recording could not be started");
+    return hapi_fail(detail, HAP_ERROR_SYSTEM, "the recording's thread could not be started: %s",
+                     strerror(errno));
   }
   hapi_session_set_tapes(session, tapes);
   return HAP_OK;
