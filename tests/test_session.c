@@ -412,7 +412,8 @@ TEST(edits_run_in_order_before_the_next_step)
   CHECK(hap_session_post(s->session, run_edit, &edits[256]) == HAP_OK); /* there is room again */
   CHECK(hap_session_stop(s->session) == HAP_OK);
   CHECK(s->seen[0] == 257 && s->seen[1] == 0); /* stop ran it */
-  edit again = {s, 0};
+  static edit again;                           /* destroy runs the last one, after this function */
+  again = (edit){s, 0};
   REQUIRE(hap_session_start(s->session) == HAP_OK);
   CHECK(hap_session_post(s->session, post_again, &again) == HAP_OK);
   CHECK(hap_session_advance(s->session, 101) == HAP_OK);
