@@ -276,7 +276,7 @@ static void close_under_emergencies(int rounds, int pause_ms)
     if (i % 2 == 0) {
       hap_device_close(device);
     }
-    hapi_emergency_remove(ops, self);
+    (void)hapi_emergency_remove(ops, self);
     ops->stop(self);
     hapi_device_release(device);
     if (i % 2 != 0) {

@@ -483,13 +483,15 @@ static void make_trouble(rig *r, int look)
     CHECK(hap_session_reset_fault(r->session) == HAP_OK);
   } else if (look == 18) {
     atomic_store(&block_ms, 30);
+  } else if (look == 21) {
+    atomic_store(&block_ms, 100); /* its watchdog takes the force off */
   }
 }
 
 TEST(a_device_with_troubles_and_pointers_that_come_and_go)
 {
   rig r;
-  recorded_setup s = recorded_setup_of("row10", HAP_MODEL_CONTACT, 1100);
+  recorded_setup s = recorded_setup_of("row10", HAP_MODEL_CONTACT, 1400);
   s.devices[0] = "virtual:path=0:0/0.2/0.025"; /* elsewhere */
   s.meanwhile = make_trouble;
   REQUIRE(recorded_create(&s, &r));
@@ -499,10 +501,12 @@ TEST(a_device_with_troubles_and_pointers_that_come_and_go)
   CHECK(hap_pointer_remove(r.session, id) == HAP_OK);
   rig_destroy(&r);
   hap_device_close(device);
-  CHECK(before.faults.count == 4 && before.loop.missed_ticks >= 25 &&
+  CHECK(before.faults.count == 5 && before.loop.missed_ticks >= 25 &&
         before.loop.contact_ticks > 10);
+  CHECK(before.faults.fault == HAP_FAULT_BLOCKED && before.faults.pointer == id.v);
   replay again = recorded_play("row10", 0);
   check_alike(&again, &before);
+  CHECK(again.stats.faults.fault == HAP_FAULT_BLOCKED && again.stats.faults.pointer == id.v);
   CHECK(again.info.pointers == 3);
   CHECK(again.stats.loop.missed_ticks <= before.loop.missed_ticks &&
         again.stats.loop.missed_ticks >=

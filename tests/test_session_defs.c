@@ -142,7 +142,7 @@ static const struct {
     WHOLE_FIELD(def, max_pointers, 0),
     WHOLE_FIELD(def, max_pointers, 17),
     WHOLE_FIELD(def, rt_priority, -1),
-    WHOLE_FIELD(def, rt_priority, 100),
+    WHOLE_FIELD(def, rt_priority, 99),
     WHOLE_FIELD(expert, trace_rows, -1),
     WHOLE_FIELD(expert, trace_rows, 1048577),
     WHOLE_FIELD(def, drive, 3),

@@ -345,7 +345,7 @@ static const option table[] = {
     {"--play-incomplete", NULL, "--play of a file that breaks off: up to there", take_flag,
      offsetof(run_options, play_incomplete), 0, 0},
     {"--rt-priority", "N", "SCHED_FIFO priority of the haptic thread (default 80), 0: none",
-     take_priority, 0, 0, 99},
+     take_priority, 0, 0, 98},
     {"--no-realtime", NULL, "do not ask for real-time rights", take_constant,
      offsetof(run_options, rig.def.rt_priority), 0, 0},
     {"--list", NULL, "scenes with their parameters, models, devices, effects", take_constant,

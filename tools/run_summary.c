@@ -49,6 +49,8 @@ static const char *fault_name(hap_fault fault)
       return "world";
     case HAP_FAULT_EMERGENCY:
       return "emergency";
+    case HAP_FAULT_BLOCKED:
+      return "blocked";
   }
   return "unknown";
 }

@@ -61,8 +61,8 @@ typedef struct hap_session_def {
    * least 12 for each of max_bodies */
   int32_t max_contacts;
   int32_t max_pointers; /* 1..16, default 4 */
-  /* SCHED_FIFO priority of the haptic thread, 0..99, default 80. Physics runs at half of it. 0:
-   * do not ask for real time */
+  /* SCHED_FIFO priority of the haptic thread, 0..98, default 80. Physics runs at half of it, the
+   * watchdogs of the devices one above. 0: do not ask for real time */
   int32_t rt_priority;
   double accuracy; /* 0..1, default HAP_ACCURACY_DEFAULT: the dial, see hapode/accuracy.h */
   /* 0.01..1: share of its period that a tick may take, and also a cycle of physics. The dial is
@@ -92,7 +92,11 @@ HAP_API void hap_session_destroy(hap_session *session);
 HAP_NODISCARD HAP_API hap_status hap_session_start(hap_session *session);
 
 /* [control] Zero force first, then the threads end. Idempotent. A stopped session can be started
- * again. HAP_ERROR_THREAD: in a callback, or this thread holds the lock. */
+ * again. HAP_ERROR_THREAD: in a callback, or this thread holds the lock.
+ *
+ * HAP_ERROR_TIMEOUT: a device has not come back from a call for a second. Its force is off (see
+ * HAP_FAULT_BLOCKED), physics has ended, and the haptic thread ends as soon as the device comes
+ * back. Call again until it is HAP_OK. */
 HAP_API hap_status hap_session_stop(hap_session *session);
 
 /* [control] FRAME: runs the whole physics steps that fit into frame_s plus the remainder of earlier

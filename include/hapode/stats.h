@@ -23,7 +23,8 @@ typedef enum hap_fault {
   HAP_FAULT_LOCAL_STATE = 4,  /* a local body's state was not finite */
   HAP_FAULT_DEVICE_WRITE = 5, /* the device's write failed */
   HAP_FAULT_WORLD = 6,        /* the ODE world holds a body that cannot be stepped */
-  HAP_FAULT_EMERGENCY = 7     /* hap_emergency_zero was called */
+  HAP_FAULT_EMERGENCY = 7,    /* hap_emergency_zero was called */
+  HAP_FAULT_BLOCKED = 10      /* the loop stood still, in a call of a device or elsewhere */
 } hap_fault;
 
 /* [any] What happened and what to do, in one sentence. "" for HAP_FAULT_NONE; never NULL. */

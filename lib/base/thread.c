@@ -11,11 +11,13 @@
 #endif
 #if defined(__SSE2__)
 #include <xmmintrin.h>
-
-#include "base/assert.h"
 #endif
 
+#include "base/assert.h"
+#include "base/clock.h"
+
 #define STACK_TOUCHED 65536
+#define JOIN_LOOK_NS 200000
 
 static int thread_create(hapi_thread *thread, void *(*entry)(void *), void *arg, int priority)
 {
@@ -40,7 +42,8 @@ static int thread_create(hapi_thread *thread, void *(*entry)(void *), void *arg,
 hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *arg,
                              const char *name, int priority)
 {
-  HAPI_ASSERT(!thread->running && priority >= 0 && priority <= 99);
+  HAPI_ASSERT(!thread->running && priority >= 0 && priority <= HAPI_THREAD_PRIORITY_MOST);
+  atomic_store(&thread->ended, false);
   bool realtime = priority > 0 && thread_create(thread, main, arg, priority) == 0;
   atomic_store(&thread->realtime, realtime);
   int failed = realtime ? 0 : thread_create(thread, main, arg, 0);
@@ -63,6 +66,24 @@ void hapi_thread_join(hapi_thread *thread)
     thread->running = false;
     atomic_store(&thread->claims, 0);
   }
+}
+
+bool hapi_thread_join_within(hapi_thread *thread, double seconds)
+{
+  int64_t end = hapi_clock_now() + (int64_t)(1e9 * seconds);
+  while (thread->running && !atomic_load(&thread->ended)) {
+    if (hapi_clock_now() >= end) {
+      return false;
+    }
+    hapi_clock_sleep_until(hapi_clock_now() + JOIN_LOOK_NS);
+  }
+  hapi_thread_join(thread);
+  return true;
+}
+
+void hapi_thread_end(hapi_thread *thread)
+{
+  atomic_store(&thread->ended, true);
 }
 
 static uintptr_t own_mark(void)

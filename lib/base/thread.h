@@ -11,10 +11,13 @@
 
 #include <hapode/status.h>
 
+#define HAPI_THREAD_PRIORITY_MOST 99 /* of SCHED_FIFO */
+
 typedef struct hapi_thread {
   pthread_t handle;
   bool running;
   _Atomic bool realtime;    /* has the priority it asked for */
+  _Atomic bool ended;       /* hapi_thread_end was called */
   _Atomic uintptr_t claims; /* who runs, after hapi_thread_claim; 0: nobody */
 } hapi_thread;
 
@@ -23,6 +26,10 @@ typedef struct hapi_thread {
 hap_status hapi_thread_start(hapi_thread *thread, void *(*main)(void *), void *arg,
                              const char *name, int priority);
 void hapi_thread_join(hapi_thread *thread); /* idempotent */
+/* For threads that may not come back, and that call hapi_thread_end last. False: it has not ended
+ * within that time and goes on; all that it uses must stay. */
+bool hapi_thread_join_within(hapi_thread *thread, double seconds);
+void hapi_thread_end(hapi_thread *thread); /* [the thread] it uses nothing any more */
 
 /* [the thread] From now on, until it is joined, what belongs to it is its own; for asserts. */
 void hapi_thread_claim(hapi_thread *thread);

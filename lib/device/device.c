@@ -9,6 +9,7 @@
 #include "base/assert.h"
 #include "base/def.h"
 #include "base/log.h"
+#include "device/emergency.h"
 #include "device/module.h"
 
 #define FIGURE_MOST 1e9 /* of what a device says of itself, in SI units */
@@ -225,7 +226,9 @@ void hap_device_close(hap_device *device)
   if (device == NULL) {
     return;
   }
-  device->ops->zero(device->self);
+  if (!hapi_emergency_is_zeroing(device->ops, device->self)) { /* one that may hang */
+    device->ops->zero(device->self);
+  }
   /* acq_rel: the thread that frees must see all that the other holder did to the device. */
   unsigned before = atomic_fetch_or_explicit(&device->holders.bits, CLOSED, memory_order_acq_rel);
   if (before == 0) {

@@ -11,9 +11,11 @@
 #include "base/clock.h"
 #include "base/def.h"
 #include "base/log.h"
+#include "base/pulse.h"
 #include "base/vec.h"
 #include "device/device.h"
 #include "device/emergency.h"
+#include "device/watchdog.h"
 
 #define FORCE_SHARE 0.3    /* of the device's own limit */
 #define FORCE_UNKNOWN 1.0  /* N, for a device that does not know its limit */
@@ -49,6 +51,9 @@ typedef struct run {
   double origin[3]; /* where it began */
   int axis;
   hapi_identify_record records[AXES];
+  hapi_pulse pulse;
+  hapi_watchdog watchdog;
+  _Atomic int blocked; /* the watchdog has taken its force off */
 } run;
 
 static const hap_identify_def def_defaults = {
@@ -108,8 +113,10 @@ static hap_status read_device(run *r)
   hap_pose pose;
   hap_twist twist;
   uint32_t buttons = 0;
+  hapi_pulse_beat(&r->pulse, HAPI_PHASE_WAIT, 0);
   int64_t now_ns = await_tick(r);
   memset(&pose, 0, sizeof pose);
+  hapi_pulse_beat(&r->pulse, HAPI_PHASE_READ, 0);
   if (!hapi_device_did(ops->read(r->device->self, now_ns, &pose, &twist, &buttons))) {
     return run_fail(r, "it cannot be read");
   }
@@ -176,11 +183,15 @@ static hap_status progress_tell(run *r)
 }
 
 /* No force after hap_emergency_zero; one that was on its way meanwhile is taken off by the end. */
-static hap_status force_write(const run *r, double force)
+static hap_status force_write(run *r, double force)
 {
   hap_wrench wanted = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hap_wrench reached;
   wanted.force[r->axis] = force;
+  if (atomic_load(&r->blocked) != 0) {
+    return run_fail(r, "it did not come back from a call in time: its force was taken off");
+  }
+  hapi_pulse_beat(&r->pulse, HAPI_PHASE_WRITE, 0);
   if (hapi_emergencies() == r->emergencies &&
       !hapi_device_did(r->device->ops->write(r->device->self, &wanted, &reached))) {
     return run_fail(r, "it takes no force");
@@ -361,6 +372,36 @@ static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
   return HAP_OK;
 }
 
+static void run_block(void *user, uint64_t word)
+{
+  run *r = user;
+  (void)word;
+  atomic_store(&r->blocked, 1);
+}
+
+static void run_tell(void *user, uint64_t word)
+{
+  const run *r = user;
+  (void)word;
+  hapi_log(HAP_LOG_ERROR, "device %s does not come back from a call: its force was taken off",
+           r->device->info.name);
+}
+
+static hap_status run_watch(run *r)
+{
+  const hapi_watchdog_def def = {.ops = r->device->ops,
+                                 .self = r->device->self,
+                                 .pulse = &r->pulse,
+                                 .rate_hz = r->def->rate_hz,
+                                 .blocked = run_block,
+                                 .tell = run_tell,
+                                 .user = r};
+  return hapi_watchdog_start(&r->watchdog, &def) >= HAP_OK
+             ? HAP_OK
+             : hapi_fail(r->detail, HAP_ERROR_SYSTEM,
+                         "the thread of the watchdog could not be started");
+}
+
 static hap_status run_device(run *r, hap_device_identity *out)
 {
   const hap_device_ops *ops = r->device->ops;
@@ -371,11 +412,20 @@ static hap_status run_device(run *r, hap_device_identity *out)
   }
   bool known = hapi_emergency_add(ops, r->device->self);
   hap_status status =
-      known ? move_all(r)
+      known ? run_watch(r)
             : hapi_fail(r->detail, HAP_ERROR_CAPACITY,
                         "all %d places for running devices are in use", HAPI_EMERGENCY_DEVICES);
+  if (status >= HAP_OK) {
+    status = move_all(r);
+  }
+  hapi_pulse_beat(&r->pulse, HAPI_PHASE_NONE, 0);
+  while (!hapi_watchdog_stop(&r->watchdog)) { /* it uses what is on the stack here */
+    run_tell(r, 0);
+  }
   ops->zero(r->device->self);
-  hapi_emergency_remove(ops, r->device->self);
+  while (!hapi_emergency_remove(ops, r->device->self)) {
+    run_tell(r, 0);
+  }
   ops->stop(r->device->self);
   HAPI_TRY(status);
   hap_device_identity_init(out, sizeof *out);

@@ -31,12 +31,16 @@ typedef struct hapi_haptic_config {
 } hapi_haptic_config;
 
 hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **out);
-void hapi_haptic_destroy(hapi_haptic *haptic); /* NULL allowed; ended before */
+void hapi_haptic_destroy(hapi_haptic *haptic); /* NULL allowed; ended before, with true */
 
 /* [control] Forgets all state, starts the devices, tells physics where the pointers are. */
 hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *detail);
 void hapi_haptic_set_start(hapi_haptic *haptic, int64_t start_ns); /* time of tick 0 */
-void hapi_haptic_end(hapi_haptic *haptic); /* zero force, devices stopped; idempotent */
+/* Zero force, devices stopped; idempotent. False: the loop or a device has not come back for
+ * HAPI_SAFETY_STOP_WAIT_S. Then nothing is freed or stopped, and the next call tries again. */
+HAP_NODISCARD bool hapi_haptic_end(hapi_haptic *haptic);
+/* [any] Where the loop stood still, in words, such as "in read of device virtual". */
+void hapi_haptic_where(hapi_haptic *haptic, hap_detail *out);
 
 /* [control] Before begin: from then on what comes from outside goes to the tape or comes from it,
  * until the tape is taken away after end. NULL: none. */
@@ -46,7 +50,8 @@ void hapi_haptic_count_missed(hapi_haptic *haptic, uint64_t ticks);
 
 /* [control] Between begin and end; not in lockstep. */
 hap_status hapi_haptic_start_thread(hapi_haptic *haptic);
-void hapi_haptic_stop_thread(hapi_haptic *haptic); /* idempotent */
+/* Idempotent. False: it has not ended for HAPI_SAFETY_STOP_WAIT_S. */
+HAP_NODISCARD bool hapi_haptic_stop_thread(hapi_haptic *haptic);
 bool hapi_haptic_is_realtime(const hapi_haptic *haptic);
 
 /* [haptic] Uses a local model that has come in and whose time has come. */
@@ -57,6 +62,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns);
 /* pointer.h */
 hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hapi_pointer_setup *def,
                                    hap_pointer_id *out, hap_detail *detail);
+/* remove, restart: HAP_ERROR_TIMEOUT: the loop or the device has not come back. */
 hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id);
 hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_detail *detail);
 /* [any] What the pointer's device says of its last failure; "" when it says nothing. */

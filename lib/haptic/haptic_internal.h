@@ -12,7 +12,9 @@
 
 #include "base/effect_figures.h"
 #include "base/histogram.h"
+#include "base/pulse.h"
 #include "base/thread.h"
+#include "device/watchdog.h"
 #include "haptic/haptic.h"
 #include "record/tape.h"
 #include "sync/triple_buffer.h"
@@ -43,6 +45,7 @@ typedef struct hapi_pointer_slot {
   void *self;
   bool has_device; /* also in a replay, where there are no ops */
   bool started;
+  hapi_watchdog watchdog;
   hap_device_info info;
   pthread_mutex_t lock; /* between applications that set, get, ask and remove */
   hapi_triple_buffer target_buffer;
@@ -120,6 +123,13 @@ typedef struct hapi_trace_ring {
   _Atomic uint64_t read;
 } hapi_trace_ring;
 
+/* What watchdogs see of the loop and tell it. */
+typedef struct hapi_standstill {
+  hapi_pulse pulse;          /* where the loop is */
+  _Atomic uint64_t blocked;  /* pulse at which it stood still; 0: the loop has heard of it */
+  _Atomic uint64_t happened; /* the newest of those */
+} hapi_standstill;
+
 struct hapi_haptic {
   hapi_haptic_config config;
   hapi_tick tick;
@@ -135,7 +145,8 @@ struct hapi_haptic {
   _Atomic int stop;
   _Atomic int reset_fault;
   _Atomic int outside_fault; /* hap_fault that another thread wants latched */
-  uint64_t emergencies;      /* calls of hap_emergency_zero that the loop has seen */
+  hapi_standstill standstill;
+  uint64_t emergencies; /* calls of hap_emergency_zero that the loop has seen */
   bool begun;
   int64_t start_ns;
   double last_tick_us;
@@ -155,6 +166,11 @@ typedef struct hapi_loop_calls {
   hap_fault outside_fault;
 } hapi_loop_calls;
 
+typedef struct hapi_loop_standstill {
+  bool blocked;     /* a watchdog has taken the force off */
+  uint32_t pointer; /* index + 1 of the pointer in whose device the loop was; 0: in none */
+} hapi_loop_standstill;
+
 typedef struct hapi_pointer_input {
   hap_pose pose;
   hap_twist twist;
@@ -173,6 +189,7 @@ void hapi_tape_begin(hapi_haptic *haptic, int64_t start_ns);
 void hapi_tape_begun(hapi_haptic *haptic);
 void hapi_tape_tick(hapi_haptic *haptic, int64_t now_ns);
 void hapi_tape_calls(hapi_haptic *haptic, hapi_loop_calls *io);
+void hapi_tape_standstill(hapi_haptic *haptic, hapi_loop_standstill *io);
 void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches);
 void hapi_tape_join(hapi_haptic *haptic, uint32_t index);
 void hapi_tape_leave(hapi_haptic *haptic, uint32_t index, bool pauses);
@@ -190,12 +207,19 @@ void hapi_loop_sample_begin(hapi_haptic *haptic);
 void hapi_loop_sample_end(hapi_haptic *haptic, int64_t spent_ns);
 void hapi_loop_note_effects(hapi_haptic *haptic); /* after a model was adopted */
 
+/* standstill.c: the loop stands still; who looks is a watchdog */
+hap_status hapi_standstill_watch(hapi_haptic *haptic, uint32_t index);     /* starts its watchdog */
+void hapi_standstill_take(hapi_haptic *haptic, hapi_loop_standstill *out); /* [haptic] */
+bool hapi_standstill_pending(const hapi_haptic *haptic);                   /* [any] */
+void hapi_standstill_stats(const hapi_haptic *haptic, hap_stats *io);      /* [any] */
+
 /* pointers.c: what the loop does with the slots */
 void hapi_pointers_follow(hapi_haptic *haptic); /* phases */
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns);
 void hapi_pointers_write(hapi_haptic *haptic);
 void hapi_pointers_publish(hapi_haptic *haptic);
 hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail);
-void hapi_pointers_stop_devices(hapi_haptic *haptic);
+/* False: one of them does not come back from a call. */
+HAP_NODISCARD bool hapi_pointers_stop_devices(hapi_haptic *haptic);
 
 #endif

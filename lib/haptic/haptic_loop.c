@@ -58,10 +58,12 @@ void hapi_haptic_destroy(hapi_haptic *haptic)
   if (haptic == NULL) {
     return;
   }
-  hapi_haptic_end(haptic);
+  bool ended = hapi_haptic_end(haptic);
+  HAPI_ASSERT(ended);
+  (void)ended;
   for (uint32_t i = 0; haptic->slots != NULL && i < haptic->config.capacity.pointers; ++i) {
     hap_pointer_id id = {((uint64_t)haptic->slots[i].generation << 32) | (i + 1)};
-    hapi_haptic_remove_pointer(haptic, id);
+    (void)hapi_haptic_remove_pointer(haptic, id);
     pthread_mutex_destroy(&haptic->slots[i].lock);
   }
   hapi_free(haptic->slots);
@@ -120,6 +122,8 @@ static void figures_reset(hapi_haptic *haptic)
   atomic_store(&haptic->ring.written, 0);
   atomic_store(&haptic->reset_fault, 0);
   atomic_store(&haptic->outside_fault, HAP_FAULT_NONE);
+  atomic_store(&haptic->standstill.blocked, 0);
+  atomic_store(&haptic->standstill.happened, 0);
 }
 
 static void state_report(hapi_haptic *haptic)
@@ -179,13 +183,13 @@ void hapi_haptic_count_missed(hapi_haptic *haptic, uint64_t ticks)
   STORE(loop.missed_ticks, LOAD(loop.missed_ticks) + ticks);
 }
 
-void hapi_haptic_end(hapi_haptic *haptic)
+bool hapi_haptic_end(hapi_haptic *haptic)
 {
-  if (haptic->begun) {
-    hapi_haptic_stop_thread(haptic);
-    hapi_pointers_stop_devices(haptic);
-    haptic->begun = false;
+  if (haptic->begun && (!hapi_haptic_stop_thread(haptic) || !hapi_pointers_stop_devices(haptic))) {
+    return false;
   }
+  haptic->begun = false;
+  return true;
 }
 
 static void publish_poses(hapi_haptic *haptic)
@@ -243,6 +247,26 @@ void hapi_haptic_receive(hapi_haptic *haptic, int64_t now_ns)
   hapi_denormals_restore(before);
 }
 
+/* The devices have zero already. */
+static void pointers_cut(hapi_haptic *haptic)
+{
+  for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
+    hapi_guard_cut(&haptic->tick.pointers.of[i]);
+  }
+}
+
+/* After the devices were read, where the loop may have stood still: it gives no force any more. */
+static void standstill_follow(hapi_haptic *haptic)
+{
+  hapi_loop_standstill io;
+  hapi_standstill_take(haptic, &io);
+  hapi_tape_standstill(haptic, &io);
+  if (io.blocked) {
+    hapi_tick_fault(&haptic->tick, HAP_FAULT_BLOCKED, io.pointer);
+    pointers_cut(haptic);
+  }
+}
+
 /* What other threads want of the tick. */
 static void calls_follow(hapi_haptic *haptic)
 {
@@ -268,9 +292,7 @@ static void calls_follow(hapi_haptic *haptic)
   }
   if (calls.emergency) {
     hapi_tick_fault(&haptic->tick, HAP_FAULT_EMERGENCY, 0);
-    for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
-      hapi_guard_cut(&haptic->tick.pointers.of[i]);
-    }
+    pointers_cut(haptic);
   }
 }
 
@@ -312,6 +334,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   HAPI_ASSERT(hapi_thread_is_mine(&haptic->thread));
   int64_t begin_ns = hapi_clock_now();
   unsigned before = hapi_denormals_flush();
+  hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_TICK, 0);
   hapi_loop_sample_begin(haptic);
   if (haptic->tape != NULL) {
     hapi_tape_tick(haptic, now_ns);
@@ -320,8 +343,11 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   calls_follow(haptic);
   messages_receive(haptic, now_ns);
   hapi_pointers_read(haptic, now_ns);
+  standstill_follow(haptic);
+  hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_TICK, 0);
   hapi_tick_run(&haptic->tick, now_ns);
   hapi_pointers_write(haptic);
+  hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_TICK, 0);
   if (haptic->tape != NULL) {
     uint64_t recording = hapi_effect_begin(&haptic->tick.sample);
     hapi_tape_ticked(haptic);
@@ -353,7 +379,7 @@ void hapi_haptic_fault(hapi_haptic *haptic, hap_fault fault)
 
 bool hapi_haptic_has_fault(const hapi_haptic *haptic)
 {
-  return LOAD(faults.fault) != HAP_FAULT_NONE;
+  return LOAD(faults.fault) != HAP_FAULT_NONE || hapi_standstill_pending(haptic);
 }
 
 void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
@@ -399,6 +425,7 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   out->loop.realtime = atomic_load(&haptic->thread.realtime) ? 1 : 0;
   out->loop.trace_dropped = LOAD(loop.trace_dropped);
   out->loop.trace_hash = LOAD(loop.hash);
+  hapi_standstill_stats(haptic, out);
 }
 
 size_t hapi_haptic_read_black_box(hapi_haptic *haptic, hap_black_box_row *rows, size_t capacity,

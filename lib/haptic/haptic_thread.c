@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "base/clock.h"
+#include "base/safety.h"
 #include "haptic/haptic_internal.h"
 
 /* Pacing: tick number m belongs to the time from t0 + mT to t0 + (m+1)T. A late loop goes on with
@@ -31,6 +32,7 @@ static uint64_t wait_for(hapi_haptic *haptic, uint64_t next)
 {
   int64_t deadline = haptic->start_ns + hapi_clock_deadline(next, haptic->config.haptic_hz);
   bool sleeps = !device_paced(haptic);
+  hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_WAIT, 0);
   if (sleeps) {
     hapi_clock_sleep_until(deadline);
   }
@@ -60,6 +62,8 @@ static void *haptic_main(void *arg)
                       haptic->start_ns + hapi_clock_deadline(now, haptic->config.haptic_hz));
     next = now + 1;
   }
+  hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_NONE, 0);
+  hapi_thread_end(&haptic->thread);
   return NULL;
 }
 
@@ -70,10 +74,10 @@ hap_status hapi_haptic_start_thread(hapi_haptic *haptic)
                            haptic->config.rt_priority);
 }
 
-void hapi_haptic_stop_thread(hapi_haptic *haptic)
+bool hapi_haptic_stop_thread(hapi_haptic *haptic)
 {
   atomic_store(&haptic->stop, 1);
-  hapi_thread_join(&haptic->thread);
+  return hapi_thread_join_within(&haptic->thread, HAPI_SAFETY_STOP_WAIT_S);
 }
 
 bool hapi_haptic_is_realtime(const hapi_haptic *haptic)

@@ -213,9 +213,11 @@ static void fail_device(hapi_haptic *haptic, uint32_t index, hap_fault fault)
   hapi_tick_fault(&haptic->tick, fault, index + 1);
 }
 
-static void ask_device(hapi_pointer_slot *slot, int64_t now_ns, hapi_pointer_input *io)
+static void ask_device(hapi_haptic *haptic, uint32_t index, int64_t now_ns, hapi_pointer_input *io)
 {
+  hapi_pointer_slot *slot = &haptic->slots[index];
   if (slot->ops != NULL) {
+    hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_READ, index);
     io->failed =
         !hapi_device_did(slot->ops->read(slot->self, now_ns, &io->pose, &io->twist, &io->buttons));
     return;
@@ -236,7 +238,7 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     }
     hapi_pointer_input in = {.pose = p->device.pose};
     if (!hapi_tape_plays(haptic->tape)) {
-      ask_device(slot, now_ns, &in);
+      ask_device(haptic, i, now_ns, &in);
     }
     if (haptic->tape != NULL) {
       hapi_tape_input(haptic, i, &in);
@@ -264,6 +266,7 @@ void hapi_pointers_write(hapi_haptic *haptic)
     }
     hapi_pointer_output out = {.reached = p->device.wrench};
     if (slot->ops != NULL) {
+      hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_WRITE, i);
       out.failed = !hapi_device_did(slot->ops->write(slot->self, &p->device.wrench, &out.reached));
     }
     if (haptic->tape != NULL) {
@@ -272,8 +275,9 @@ void hapi_pointers_write(hapi_haptic *haptic)
     if (out.failed) {
       fail_device(haptic, i, HAP_FAULT_DEVICE_WRITE);
     }
-    if (slot->ops != NULL && hapi_emergencies() != haptic->emergencies) {
-      slot->ops->zero(slot->self); /* it came while this force was being written */
+    if (slot->ops != NULL &&
+        (hapi_emergencies() != haptic->emergencies || hapi_standstill_pending(haptic))) {
+      slot->ops->zero(slot->self); /* another zero came while this force was being written */
     }
   }
 }
@@ -310,8 +314,30 @@ void hapi_pointers_publish(hapi_haptic *haptic)
 
 /* ---- the application's side ---- */
 
+/* False: a zero of the device does not come back, and so this one would not. The device is left
+ * alone. */
+static bool stop_device(hapi_pointer_slot *slot)
+{
+  if (slot->ops == NULL || !slot->started) {
+    return true;
+  }
+  if (!hapi_watchdog_stop(&slot->watchdog)) {
+    return false;
+  }
+  if (!hapi_emergency_is_zeroing(slot->ops, slot->self)) {
+    slot->ops->zero(slot->self);
+  }
+  if (!hapi_emergency_remove(slot->ops, slot->self)) {
+    return false;
+  }
+  slot->ops->stop(slot->self);
+  slot->started = false;
+  return true;
+}
+
 static hap_status start_device(hapi_haptic *haptic, hapi_pointer_slot *slot, hap_detail *detail)
 {
+  HAPI_ASSERT(slot >= haptic->slots && slot < haptic->slots + haptic->config.capacity.pointers);
   if (slot->ops == NULL || slot->started) {
     return HAP_OK;
   }
@@ -334,17 +360,15 @@ static hap_status start_device(hapi_haptic *haptic, hapi_pointer_slot *slot, hap
                      HAPI_EMERGENCY_DEVICES);
   }
   slot->started = true;
-  return HAP_OK;
-}
-
-static void stop_device(hapi_pointer_slot *slot)
-{
-  if (slot->ops != NULL && slot->started) {
-    slot->ops->zero(slot->self);
-    hapi_emergency_remove(slot->ops, slot->self);
-    slot->ops->stop(slot->self);
-    slot->started = false;
+  hap_status watched = hapi_standstill_watch(haptic, (uint32_t)(slot - haptic->slots));
+  if (watched < HAP_OK) {
+    (void)stop_device(slot);
+    return hapi_fail(detail, watched,
+                     "device %s has no force: the thread of its watchdog could "
+                     "not be started",
+                     slot->ops->name);
   }
+  return HAP_OK;
 }
 
 hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail)
@@ -356,7 +380,7 @@ hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail)
     }
     hap_status status = start_device(haptic, slot, detail);
     if (status < HAP_OK) {
-      hapi_pointers_stop_devices(haptic);
+      (void)hapi_pointers_stop_devices(haptic);
       return status;
     }
     atomic_store(&slot->phase, HAPI_POINTER_ADDED);
@@ -364,11 +388,13 @@ hap_status hapi_pointers_start_devices(hapi_haptic *haptic, hap_detail *detail)
   return HAP_OK;
 }
 
-void hapi_pointers_stop_devices(hapi_haptic *haptic)
+bool hapi_pointers_stop_devices(hapi_haptic *haptic)
 {
+  bool all = true;
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
-    stop_device(&haptic->slots[i]);
+    all = stop_device(&haptic->slots[i]) && all;
   }
+  return all;
 }
 
 bool hapi_haptic_has_pointers(const hapi_haptic *haptic)
@@ -490,16 +516,23 @@ hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hapi_pointer_setup
   return HAP_OK;
 }
 
-/* The loop lets go of the pointer; when no loop runs, it is done here. */
-static void leave_loop(hapi_haptic *haptic, hapi_pointer_slot *slot, hapi_pointer_phase way)
+/* The loop lets go of the pointer; when no loop runs, it is done here. False: the loop stands
+ * still, and the pointer stays what it was. */
+static bool leave_loop(hapi_haptic *haptic, hapi_pointer_slot *slot, hapi_pointer_phase way)
 {
-  atomic_store(&slot->phase, (int)way);
+  int64_t end = hapi_clock_now() + (int64_t)(1e9 * HAPI_SAFETY_STOP_WAIT_S);
+  int before = atomic_exchange(&slot->phase, (int)way);
   while (haptic->thread.running && atomic_load(&slot->phase) != phase_after((int)way)) {
+    int wanted = (int)way;
+    if (hapi_clock_now() >= end && atomic_compare_exchange_strong(&slot->phase, &wanted, before)) {
+      return false;
+    }
     hapi_clock_sleep_until(hapi_clock_now() + 1000000);
   }
   if (!haptic->thread.running) {
     hapi_pointers_follow(haptic);
   }
+  return true;
 }
 
 hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
@@ -508,8 +541,13 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
   if (slot == NULL) {
     return HAP_ERROR_NOT_FOUND;
   }
-  leave_loop(haptic, slot, HAPI_POINTER_LEAVING);
-  stop_device(slot);
+  if (!leave_loop(haptic, slot, HAPI_POINTER_LEAVING)) {
+    return HAP_ERROR_TIMEOUT;
+  }
+  if (!stop_device(slot)) {
+    atomic_store(&slot->phase, HAPI_POINTER_PAUSED);
+    return HAP_ERROR_TIMEOUT;
+  }
   if (slot->def.device != NULL) {
     pthread_mutex_lock(&slot->lock); /* nobody is asking it to explain itself */
     hapi_device_release(slot->def.device);
@@ -544,8 +582,12 @@ hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, h
         detail, HAP_ERROR_STATE,
         slot->ops == NULL ? "the pointer has no device" : "the session is not started");
   }
-  leave_loop(haptic, slot, HAPI_POINTER_PAUSING);
-  stop_device(slot);
+  if (!leave_loop(haptic, slot, HAPI_POINTER_PAUSING) || !stop_device(slot)) {
+    hap_detail where;
+    hapi_haptic_where(haptic, &where);
+    return hapi_fail(detail, HAP_ERROR_TIMEOUT, "the loop or the device has not come back: %.400s",
+                     where.text);
+  }
   hap_status status = start_device(haptic, slot, detail);
   if (status >= HAP_OK) {
     atomic_store_explicit(&slot->phase, HAPI_POINTER_ADDED, memory_order_release);

@@ -74,6 +74,17 @@ void hapi_tape_calls(hapi_haptic *haptic, hapi_loop_calls *io)
   }
 }
 
+void hapi_tape_standstill(hapi_haptic *haptic, hapi_loop_standstill *io)
+{
+  if (hapi_tape_records(haptic->tape) && io->blocked) {
+    haptic->note->flags |=
+        (uint16_t)(HAPI_CELL_BLOCKED | io->pointer << HAPI_CELL_BLOCKED_POINTER_SHIFT);
+  } else if (hapi_tape_plays(haptic->tape)) {
+    io->blocked = (haptic->tick_cell->flags & HAPI_CELL_BLOCKED) != 0;
+    io->pointer = haptic->tick_cell->flags >> HAPI_CELL_BLOCKED_POINTER_SHIFT;
+  }
+}
+
 /* Not before the first tick: there all that is there is taken. */
 void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches)
 {

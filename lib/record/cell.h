@@ -109,6 +109,9 @@ enum {
   /* of TICK */
   HAPI_CELL_RESET = 1,     /* the fault was reset */
   HAPI_CELL_EMERGENCY = 2, /* hap_emergency_zero had been called */
+  HAPI_CELL_BLOCKED = 4, /* a watchdog had taken the force off; the high byte: 1 + the index of the
+                              pointer in whose device the loop was, 0: none */
+  HAPI_CELL_BLOCKED_POINTER_SHIFT = 8,
   /* of POSE and FORCE */
   HAPI_CELL_FAILED = 1, /* the device did not answer, or did not take it */
   /* of LEAVE */

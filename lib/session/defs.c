@@ -9,6 +9,7 @@
 #include <hapode/research.h>
 
 #include "base/log.h"
+#include "base/thread.h"
 #include "session/session_internal.h"
 
 /* The def structs: defaults and checks. */
@@ -117,7 +118,7 @@ static hap_status def_check(const hap_session_def *def, hap_detail *detail)
       HAPI_RULE(def, max_bodies, 1, 1024),
       HAPI_RULE(def, max_contacts, 1, 4096),
       HAPI_RULE(def, max_pointers, 1, HAP_TRACE_POINTERS_MAX),
-      HAPI_RULE(def, rt_priority, 0, 99),
+      HAPI_RULE(def, rt_priority, 0, HAPI_THREAD_PRIORITY_MOST - 1),
       HAPI_RULE(expert, trace_rows, 0, 1048576),
       HAPI_RULE(expert, max_hull_points, 0, 1048576),
       HAPI_RULE(expert, lookback, 0.0, 0.5),

@@ -67,13 +67,32 @@ hap_status hapi_session_may_change(const hap_session *session)
                                  "the session plays a recording, and what happened is in it");
 }
 
+/* What the haptic thread uses stays as it is while that thread is somewhere in a device. So do the
+ * devices, which the session still has. */
+static void session_leave(const hap_session *session)
+{
+  hap_detail where;
+  hapi_haptic_where(session->haptic, &where);
+  hapi_log(HAP_LOG_ERROR,
+           "hap_session_destroy: the force is off, but memory and devices of the session are not "
+           "freed, as they are in use: %.300s",
+           where.text);
+}
+
 void hapi_session_free(hap_session *session)
 {
-  hapi_haptic_destroy(session->haptic);
+  bool stuck = session->started;
+  if (stuck) {
+    session_leave(session);
+  } else {
+    hapi_haptic_destroy(session->haptic);
+  }
   hapi_physics_destroy(session->physics);
   hapi_contact_destroy(session->contact);
-  hapi_exchange_destroy(session->exchange);
-  hapi_recorder_destroy(session->recorder);
+  if (!stuck) {
+    hapi_exchange_destroy(session->exchange);
+    hapi_recorder_destroy(session->recorder);
+  }
   pthread_mutex_destroy(&session->detail_lock);
   hapi_free(session);
 }
@@ -191,9 +210,17 @@ hap_status hap_session_stop(hap_session *session)
   if (!session->started) {
     return HAP_OK;
   }
-  hapi_haptic_end(session->haptic); /* first: the hand is let go */
+  bool ended = hapi_haptic_end(session->haptic); /* first: the hand is let go */
   hapi_contact_stop_thread(session->contact);
   hapi_physics_end(session->physics);
+  if (!ended) {
+    hap_detail where;
+    hapi_haptic_where(session->haptic, &where);
+    return hapi_session_fail(session, HAP_ERROR_TIMEOUT,
+                             "the session has not stopped, and its force is off: %.300s; stop "
+                             "again when the device has come back",
+                             where.text);
+  }
   hapi_record_stop(session);
   if (session->memory_locked) {
     size_t size = 0;
@@ -461,6 +488,10 @@ const char *hap_fault_text(hap_fault fault)
              "reset";
     case HAP_FAULT_EMERGENCY:
       return "hap_emergency_zero was called; force is zero until the fault is reset";
+    case HAP_FAULT_BLOCKED:
+      return "the loop stood still and a watchdog took the force off; force is zero until the "
+             "fault "
+             "is reset";
   }
   return "";
 }
@@ -504,11 +535,15 @@ hap_status hap_session_detail(const hap_session *session, hap_detail *out)
     return HAP_OK;
   }
   unsigned place = (unsigned)(stats.faults.pointer & 0xffffffffu);
+  hap_detail why = {""}; /* the pointer it came from, by the number of its place, and its device */
+  if (fault == HAP_FAULT_BLOCKED) { /* a device that hangs is not asked */
+    hapi_haptic_where(session->haptic, &why);
+  }
   if (place == 0) {
-    snprintf(out->text, sizeof out->text, "%s", hap_fault_text(fault));
+    snprintf(out->text, sizeof out->text, "%s%s%.300s", hap_fault_text(fault),
+             why.text[0] != '\0' ? ": " : "", why.text);
     return HAP_OK;
   }
-  hap_detail why = {""}; /* the pointer it came from, by the number of its place, and its device */
   if (fault == HAP_FAULT_DEVICE_READ || fault == HAP_FAULT_DEVICE_WRITE) {
     hapi_haptic_explain(session->haptic, (hap_pointer_id){stats.faults.pointer}, &why);
   }

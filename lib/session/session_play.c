@@ -302,6 +302,10 @@ static hap_status check_packet(const hap_player *player, const hapi_cell *cells,
   if (cells[0].index > HAP_FAULT_EMERGENCY) {
     return play_contradicts(player, "a fault that there is not", detail);
   }
+  if (cells[0].kind == HAPI_CELL_TICK &&
+      cells[0].flags >> HAPI_CELL_BLOCKED_POINTER_SHIFT > player->session->def.max_pointers) {
+    return play_contradicts(player, "a device that there is not", detail);
+  }
   for (uint32_t i = 1; i < count; ++i) {
     if (cells[i].kind == HAPI_CELL_JOIN) {
       HAPI_TRY(i + HAPI_JOIN_CELLS <= count

@@ -47,7 +47,7 @@ static void check_def(const rig_options *of)
   FUZZ_CHECK(expert->force_error_wanted == 0.0 || expert->lookback > 0.0);
   check_between(expert->tick_share, 0.0, 1.0);
   check_between(expert->physics_share, 0.0, 1.0);
-  check_between(def->rt_priority, 0, 99);
+  check_between(def->rt_priority, 0, 98);
   check_between(research->physics_latency_ticks, -1, 20000);
   check_between(def->drive, HAP_DRIVE_THREADS, HAP_DRIVE_LOCKSTEP);
   check_between(research->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD);

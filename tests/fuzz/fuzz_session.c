@@ -178,7 +178,7 @@ static void check_def(const hap_session_def *def)
       {def->max_bodies, 1, 1024},
       {def->max_contacts, 1, 4096},
       {def->max_pointers, 1, 16},
-      {def->rt_priority, 0, 99},
+      {def->rt_priority, 0, 98},
       {research->physics_latency_ticks, -1, def->haptic_hz / def->physics_hz + 1e-6},
       {expert->trace_rows, 0, 1048576},
       {expert->max_edge_probes, expert->max_edge_probes == HAP_BY_ACCURACY ? HAP_BY_ACCURACY : 0,

@@ -92,7 +92,7 @@ hap_status conform_start(conform *c)
 void conform_stop(conform *c)
 {
   if (c->running) {
-    hapi_emergency_remove(c->ops, c->self);
+    (void)hapi_emergency_remove(c->ops, c->self);
     c->running = false;
   }
   conform_enter("stop", CONFORM_BLOCK_LIMIT_S);
