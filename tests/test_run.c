@@ -521,7 +521,91 @@ static void run_interrupt(int number, const char *arguments)
   CHECK(program_finish(child) == 0);
   CHECK(says("stopped early"));
   CHECK(number_of("ticks") > 0.0 && number_of("ticks") < 1e7);
-  CHECK(number_of("faults") == 0.0);
+  CHECK(number_of("faults") == 0.0 || strcmp(value_of("fault"), "emergency") == 0);
+}
+
+/* ---- a device that hangs ---- */
+
+static char letters[300]; /* what it did, see tests/modules/hangs.c */
+
+static const char *letters_read(void)
+{
+  FILE *file = fopen(folder_path("letters"), "r");
+  size_t count = file != NULL ? fread(letters, 1, sizeof letters - 1, file) : 0;
+  letters[count] = '\0';
+  if (file != NULL) {
+    fclose(file);
+  }
+  return letters;
+}
+
+static bool await_letter(char letter)
+{
+  const struct timespec pause = {0, 5000000};
+  for (int i = 0; i < 4000 && strchr(letters_read(), letter) == NULL; ++i) {
+    nanosleep(&pause, NULL);
+  }
+  return strchr(letters, letter) != NULL;
+}
+
+static pid_t hanging_start(const char *options, const char *call)
+{
+  char arguments[1000];
+  (void)unlink(folder_path("letters"));
+  snprintf(arguments, sizeof arguments, "%s module:%s,call=%s,file=%s", options,
+           getenv("HAPODE_HANGS"), call, folder_path("letters"));
+  pid_t child = program_start(arguments, NULL);
+  REQUIRE(child > 0);
+  return child;
+}
+
+/* It holds a force and comes back from nothing. */
+TEST(a_device_that_hangs_ends_the_run_with_zero)
+{
+  static const char *const calls[] = {"read", "write"};
+  for (int i = 0; i < 2; ++i) {
+    pid_t child = hanging_start("--seconds 60 --device", calls[i]);
+    CHECK(program_finish(child) == 1);
+    CHECK(says("device hangs did not come back from") && says(calls[i]));
+    CHECK(says("not freed") && strcmp(value_of("fault"), "blocked") == 0);
+    letters_read();
+    CHECK(strstr(letters, "fhz") != NULL && letters[strlen(letters) - 1] == 'z');
+  }
+}
+
+/* The check has no watchdog: the force is taken by the signal. */
+TEST(the_first_signal_takes_the_force_of_a_device_that_hangs)
+{
+  static const char *const calls[] = {"read", "write"};
+  for (int i = 0; i < 2; ++i) {
+    int result = 0;
+    pid_t child = hanging_start("--check-wait 0 --check-device", calls[i]);
+    CHECK(await_letter('h'));
+    CHECK(letters[strlen(letters) - 1] == 'h'); /* with its force */
+    kill(child, SIGINT);
+    for (int k = 0; k < 4000 && letters[strlen(letters) - 1] != 'z'; ++k) {
+      const struct timespec pause = {0, 1000000};
+      nanosleep(&pause, NULL);
+      letters_read();
+    }
+    CHECK(letters[strlen(letters) - 1] == 'z');
+    kill(child, SIGINT);
+    CHECK(waitpid(child, &result, 0) == child);
+    CHECK(WIFSIGNALED(result) && WTERMSIG(result) == SIGINT);
+  }
+}
+
+TEST(the_second_signal_ends_a_run_whose_device_hangs_in_zero)
+{
+  const struct timespec pause = {0, 300000000};
+  int result = 0;
+  pid_t child = hanging_start("--seconds 60 --device", "zero");
+  CHECK(await_letter('f'));
+  kill(child, SIGTERM);
+  nanosleep(&pause, NULL);
+  kill(child, SIGINT);
+  CHECK(waitpid(child, &result, 0) == child);
+  CHECK(WIFSIGNALED(result) && WTERMSIG(result) == SIGINT);
 }
 
 TEST(a_signal_ends_the_run_with_its_summary)

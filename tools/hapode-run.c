@@ -314,10 +314,23 @@ static int run_session(run_options *options)
   return code;
 }
 
+/* Any thread but the haptic. */
+static void log_show(hap_log_level level, const char *text, void *user)
+{
+  (void)user;
+  if (level <= HAP_LOG_WARNING) {
+    fprintf(stderr, "hapode-run: %s\n", text);
+  }
+}
+
 int main(int argc, char **argv)
 {
   run_options options;
   hap_detail detail = {""};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.log = log_show;
+  (void)hap_hooks_set(&hooks);
   if (run_options_parse(argc, argv, &options, &detail) < HAP_OK) {
     return usage_complain(EXIT_USAGE, detail.text);
   }

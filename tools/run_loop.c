@@ -7,12 +7,14 @@
 #include <signal.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "tools/run_summary.h"
 
 #define PAUSE_S 0.01 /* between two looks at the session */
 #define PROGRESS_S 0.1
 #define RECONNECT_S 0.5 /* between two tries */
+#define DIE_S 1         /* for the zero of all devices, before a signal ends the process */
 #define ROWS_AT_ONCE 64
 #define ROWS_MIN 2000 /* the reader may be away for 2 s at 1 kHz */
 #define ROWS_MAX 20000
@@ -28,11 +30,28 @@ typedef struct watch {
   hap_detail *detail;
 } watch;
 
+static volatile sig_atomic_t dying_of;
+
+/* A device's zero does not come back: the others have been let go. */
+static void die_now(int number)
+{
+  sigset_t own;
+  (void)number;
+  signal(dying_of, SIG_DFL);
+  sigemptyset(&own);
+  sigaddset(&own, dying_of);
+  sigprocmask(SIG_UNBLOCK, &own, NULL);
+  raise(dying_of);
+}
+
 /* Ends the process by the signal, with the force gone. A tick that is under way may write once
  * more: hence twice, with 2 ms between. */
 static void let_go_and_die(int number)
 {
   const struct timespec tick = {0, 2000000};
+  dying_of = number;
+  signal(SIGALRM, die_now);
+  alarm(DIE_S);
   hap_emergency_zero();
   (void)nanosleep(&tick, NULL);
   hap_emergency_zero();
@@ -46,13 +65,15 @@ static void want_stop(int number)
     let_go_and_die(number); /* whoever asks twice does not wait for what hangs */
   }
   stop_wanted = 1;
+  hap_emergency_zero(); /* here, as the program itself may wait for a device that hangs */
 }
 
-static void set_handler(const int *numbers, size_t count, void (*handler)(int))
+static void set_handler(const int *numbers, size_t count, void (*handler)(int), int flags)
 {
   struct sigaction action;
   memset(&action, 0, sizeof action);
   action.sa_handler = handler;
+  action.sa_flags = flags;
   sigemptyset(&action.sa_mask);
   for (size_t i = 0; i < count; ++i) {
     sigaction(numbers[i], &action, NULL);
@@ -64,9 +85,10 @@ void run_loop_catch_signals(void)
   const int ending[] = {SIGINT, SIGTERM, SIGHUP};
   const int deadly[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
   const int harmless[] = {SIGPIPE}; /* a reader that goes away must not end us with the force on */
-  set_handler(ending, sizeof ending / sizeof ending[0], want_stop);
-  set_handler(deadly, sizeof deadly / sizeof deadly[0], let_go_and_die);
-  set_handler(harmless, 1, SIG_IGN);
+  /* The second one may come while the first one's handler waits for a device that hangs. */
+  set_handler(ending, sizeof ending / sizeof ending[0], want_stop, SA_NODEFER);
+  set_handler(deadly, sizeof deadly / sizeof deadly[0], let_go_and_die, 0);
+  set_handler(harmless, 1, SIG_IGN, 0);
 }
 
 bool run_loop_stop_wanted(void)
@@ -174,6 +196,9 @@ static hap_status watch_look(watch *w, double t)
   run_loop *loop = w->loop;
   hap_stats stats;
   trace_drain(loop);
+  if (stop_wanted != 0) { /* the fault is its emergency */
+    return HAP_END;
+  }
   (void)hap_session_stats(loop->rig->session, &stats, sizeof stats);
   run_coupling_look(loop->coupling, loop->rig);
   if (loop->picture != NULL && t >= w->next_sample) {
@@ -251,10 +276,17 @@ hap_status run_loop_run(run_loop *loop, hap_stats *stats, hap_detail *detail)
   }
   bool lockstep = loop->options->rig.def.drive == HAP_DRIVE_LOCKSTEP;
   hap_status status = lockstep ? run_lockstep(&w) : run_threads(&w);
-  hap_session_stop(session);
+  hap_status stopped = hap_session_stop(session);
   run_progress_clear(&loop->progress);
   (void)hap_session_stats(session, stats, sizeof *stats);
   trace_drain(loop);
+  if (stopped < HAP_OK) {
+    (void)hap_session_detail(session, detail);
+    return stopped;
+  }
+  if (status == HAP_OK && stop_wanted != 0) {
+    return HAP_END;
+  }
   bool plays = loop->options->play_path != NULL;
   if (status == HAP_OK && stats->faults.fault != HAP_FAULT_NONE &&
       !plays) { /* waited for to the end */
