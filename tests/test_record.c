@@ -484,7 +484,7 @@ static void make_trouble(rig *r, int look)
   } else if (look == 18) {
     atomic_store(&block_ms, 30);
   } else if (look == 21) {
-    atomic_store(&block_ms, 100); /* its watchdog takes the force off */
+    atomic_store(&block_ms, 150); /* its watchdog takes the force off */
   }
 }
 

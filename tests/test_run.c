@@ -553,7 +553,7 @@ static pid_t hanging_start(const char *options, const char *call)
   char arguments[1000];
   (void)unlink(folder_path("letters"));
   snprintf(arguments, sizeof arguments, "%s module:%s,call=%s,file=%s", options,
-           getenv("HAPODE_HANGS"), call, folder_path("letters"));
+           folder_module("HAPODE_HANGS"), call, folder_path("letters"));
   pid_t child = program_start(arguments, NULL);
   REQUIRE(child > 0);
   return child;

@@ -235,8 +235,8 @@ TEST(a_standstill_is_counted_in_looks)
 {
   CHECK(HAPI_SAFETY_LOOK_S == 0.005);
   for (int phase = HAPI_PHASE_TICK; phase <= HAPI_PHASE_WRITE; ++phase) {
-    CHECK(looks_until((hapi_phase)phase, 1000.0) == 4);
-    CHECK(looks_until((hapi_phase)phase, 20000.0) == 4);
+    CHECK(looks_until((hapi_phase)phase, 1000.0) == 7);
+    CHECK(looks_until((hapi_phase)phase, 20000.0) == 7);
     CHECK(looks_until((hapi_phase)phase, 100.0) == 8); /* a device may take two ticks for a read */
   }
   CHECK(looks_until(HAPI_PHASE_WAIT, 1000.0) == 20);
@@ -247,8 +247,8 @@ TEST(a_loop_that_moves_begins_the_count_anew)
 {
   hapi_pulse pulse = {0};
   hapi_looks watch = {0};
-  for (int i = 0; i < 100; ++i) {
-    if (i % 4 == 0) {
+  for (int i = 0; i < 140; ++i) {
+    if (i % 7 == 0) {
       hapi_pulse_beat(&pulse, HAPI_PHASE_READ, 0); /* in the same call of the next tick */
     }
     CHECK(!hapi_watchdog_look(&watch, hapi_pulse_look(&pulse), 1000.0));

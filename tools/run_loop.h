@@ -27,9 +27,9 @@ typedef struct run_loop {
 /* Rows that the session has to keep for run_loop_run. 0: nobody wants them. */
 int32_t run_loop_trace_rows(const run_options *options);
 
-/* From now on SIGINT, SIGTERM and SIGHUP take the force off at once, whatever the program waits for,
- * and end the run instead of the process; a second one of them ends the process too. Whatever signal
- * ends the process, the force is zero before. */
+/* From now on SIGINT, SIGTERM and SIGHUP take the force off at once, whatever the program waits
+ * for, and end the run instead of the process; a second one of them ends the process too. Whatever
+ * signal ends the process, the force is zero before. */
 void run_loop_catch_signals(void);
 
 /* Such a signal has come. */

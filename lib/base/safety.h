@@ -35,7 +35,7 @@
 
 /* ---- a loop that stands still ---- */
 #define HAPI_SAFETY_LOOK_S 0.005      /* s */
-#define HAPI_SAFETY_BLOCKED_S 0.02    /* s */
+#define HAPI_SAFETY_BLOCKED_S 0.035   /* s */
 #define HAPI_SAFETY_BLOCKED_TICKS 4.0 /* 1 */
 #define HAPI_SAFETY_UNWOKEN_S 0.1     /* s */
 #define HAPI_SAFETY_STOP_WAIT_S 1.0   /* s */
