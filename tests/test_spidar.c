@@ -8,13 +8,14 @@
 
 #include <fcntl.h>
 #include <stdint.h>
+#include <sys/resource.h>
 
 #include <hapode/hapode.h>
 
 #include "base/clock.h"
 #include "base/vec.h"
 #include "device/device.h"
-#include "plugins/spidar/serial.h"
+#include "plugins/spidar/spidar.h"
 #include "tests/spidar_rig.h"
 #include "tools/rig.h"
 
@@ -156,6 +157,31 @@ TEST(boards_that_do_not_fit_are_named)
   CHECK(!open_device(&h, "", &detail));
   CHECK(strstr(detail.text, "no motor board answers") != NULL);
   REQUIRE(emulated_tell(&machine, "silent all 0"));
+}
+
+/* A port of another machine hears nothing of a list, and the warning comes before a question. */
+TEST(a_list_sends_nothing)
+{
+  char command[400];
+  char name[64];
+  int master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
+  REQUIRE(master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0 &&
+          ptsname_r(master, name, sizeof name) == 0);
+  int other = open(name, O_RDWR | O_NOCTTY | O_CLOEXEC); /* so that the line is up */
+  for (int asked = 0; asked < 2; ++asked) {
+    uint8_t bytes[64];
+    snprintf(command, sizeof command,
+             "HAPODE_SPIDAR_PORT=%s \"%s\" %s >%s/list 2>&1 && grep -q '%s' %s/list", name,
+             getenv("HAPODE_RUN"), asked ? "--list-probe" : "--list", machine.folder,
+             asked ? "bytes are sent" : name, machine.folder);
+    CHECK(system(command) == 0);
+    ssize_t count = read(master, bytes, sizeof bytes);
+    CHECK(asked ? count > 0 : count < 0 && errno == EAGAIN);
+  }
+  snprintf(command, sizeof command, "%s/list", machine.folder);
+  unlink(command);
+  close(other);
+  close(master);
 }
 
 /* ---- force ---- */
@@ -367,6 +393,173 @@ TEST(a_loop_that_hangs_leaves_no_force)
   CHECK(emulated_await(&machine, true));
 }
 
+static char logged[600]; /* newest warning */
+
+static void log_keep(hap_log_level level, const char *text, void *user)
+{
+  (void)level;
+  (void)user;
+  snprintf(logged, sizeof logged, "%s", text);
+}
+
+static hapi_spidar_pulse *pulse_of(const hands *h)
+{
+  return ((hapi_spidar_device *)h->self)->guard.pulse;
+}
+
+TEST(no_guard_no_force)
+{
+  hands h;
+  hap_detail detail = {""};
+  struct rlimit before;
+  REQUIRE(open_device(&h, ",timeout=5", &detail));
+  REQUIRE(getrlimit(RLIMIT_NOFILE, &before) == 0);
+  int next = open("/dev/null", O_RDONLY | O_CLOEXEC);
+  close(next);
+  const struct rlimit none = {(rlim_t)next, before.rlim_max};
+  REQUIRE(setrlimit(RLIMIT_NOFILE, &none) == 0);
+  hap_status status = h.ops->start(h.self);
+  REQUIRE(setrlimit(RLIMIT_NOFILE, &before) == 0);
+  CHECK(status == HAP_ERROR_DEVICE);
+  CHECK(status_explains(&h, "guard process") && status_explains(&h, "stall=0"));
+  CHECK(status_explains(&h, strerror(EMFILE)));
+  CHECK(read_once(&h) == HAP_ERROR_STATE && emulated_is_limp(&machine));
+  CHECK(h.ops->start(h.self) == HAP_OK && hands_push(&h, 1.0, 5) == HAP_OK);
+  hap_device_close(h.device);
+  logged[0] = '\0';
+  REQUIRE(open_device(&h, ",timeout=5,stall=0", &detail));
+  CHECK(h.ops->start(h.self) == HAP_OK && hands_push(&h, 1.0, 5) == HAP_OK);
+  CHECK(strstr(logged, "no guard process") != NULL);
+  hap_device_close(h.device);
+  CHECK(emulated_await(&machine, true));
+}
+
+/* The limit on processes holds for users other than root. */
+TEST(a_fork_that_fails_is_no_guard)
+{
+  if (geteuid() != 0) {
+    SKIP("only root can become another user");
+  }
+  pid_t child = fork();
+  if (child == 0) {
+    hands h;
+    hap_detail detail = {""};
+    const struct rlimit none = {0, 0};
+    bool good = open_device(&h, ",timeout=5", &detail) && setrlimit(RLIMIT_NPROC, &none) == 0 &&
+                setresuid(65534, 65534, 65534) == 0 && h.ops->start(h.self) == HAP_ERROR_DEVICE &&
+                status_explains(&h, "guard process");
+    _exit(good ? 0 : 1);
+  }
+  int status = 0;
+  CHECK(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  CHECK(emulated_is_limp(&machine));
+}
+
+TEST(a_guard_that_is_killed_is_a_fault)
+{
+  hands h;
+  hap_detail detail = {""};
+  int ticks = 0;
+  REQUIRE(open_device(&h, ",timeout=5,stall=10", &detail));
+  REQUIRE(h.ops->start(h.self) == HAP_OK);
+  CHECK(hands_push(&h, 3.0, 50) == HAP_OK);
+  double begin = emulated_clock();
+  REQUIRE(kill((pid_t)atomic_load(&pulse_of(&h)->guard), SIGKILL) == 0);
+  while (ticks < 2000 && hands_push(&h, 3.0, 1) == HAP_OK) {
+    ++ticks;
+  }
+  h.ops->zero(h.self); /* as the session does at once */
+  CHECK(emulated_await(&machine, true));
+  printf("# %d ticks until it was noticed, zero after %.0f ms\n", ticks,
+         1e3 * (emulated_clock() - begin));
+  CHECK(ticks < 200); /* 1 or 2, where the machine does nothing else */
+  CHECK(status_explains(&h, "guard process") && status_explains(&h, "was it killed"));
+  CHECK(hands_push(&h, 3.0, 1) == HAP_ERROR_DEVICE && emulated_is_limp(&machine));
+  h.ops->stop(h.self);
+  CHECK(h.ops->start(h.self) == HAP_OK && hands_push(&h, 1.0, 5) == HAP_OK); /* a new one */
+  hap_device_close(h.device);
+  CHECK(emulated_await(&machine, true));
+}
+
+static void plug_in(void)
+{
+  char line[128];
+  REQUIRE(emulated_tell(&machine, "plug"));
+  REQUIRE(emulated_line(&machine, "port: ", line, sizeof line));
+}
+
+/* Pulled while it holds a force, which it keeps. */
+static void cable_pull(hands *h)
+{
+  hap_detail detail = {""};
+  REQUIRE(open_device(h, ",timeout=5,stall=10", &detail));
+  REQUIRE(h->ops->start(h->self) == HAP_OK);
+  CHECK(hands_push(h, 3.0, 50) == HAP_OK);
+  REQUIRE(emulated_tell(&machine, "unplug"));
+  CHECK(await_status(h, HAP_ERROR_DEVICE));
+  h->ops->zero(h->self);
+  emulated_sleep(0.1);
+  CHECK(!emulated_is_limp(&machine));
+}
+
+TEST(boards_whose_cable_is_in_again_are_zeroed_by_the_guard)
+{
+  hands h;
+  cable_pull(&h); /* nobody does anything about it */
+  plug_in();
+  CHECK(emulated_await(&machine, true));
+  for (int i = 0; i < 2000 && !atomic_load(&pulse_of(&h)->rescued); ++i) {
+    emulated_sleep(1e-3); /* it sends zeros several times */
+  }
+  CHECK(status_explains(&h, "came back"));
+  h.ops->stop(h.self);
+  CHECK(h.ops->start(h.self) == HAP_OK && hands_push(&h, 1.0, 5) == HAP_OK);
+  hap_device_close(h.device);
+  CHECK(emulated_await(&machine, true));
+}
+
+TEST(boards_are_zeroed_when_the_program_has_ended_before)
+{
+  hands h;
+  cable_pull(&h);
+  h.ops->stop(h.self);
+  hap_device_close(h.device);
+  plug_in();
+  CHECK(emulated_await(&machine, true));
+}
+
+TEST(boards_are_zeroed_when_the_program_was_killed_before)
+{
+  pid_t child = fork();
+  if (child == 0) {
+    hands h;
+    cable_pull(&h);
+    _exit(tap_failures);
+  }
+  int status = 0;
+  CHECK(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  CHECK(!emulated_is_limp(&machine));
+  plug_in();
+  CHECK(emulated_await(&machine, true));
+}
+
+TEST(other_boards_behind_the_same_name_are_left_alone)
+{
+  hands h;
+  hap_detail detail = {""};
+  cable_pull(&h);
+  REQUIRE(emulated_tell(&machine, "report 0 B3F"));
+  plug_in();
+  emulated_sleep(1.5);
+  CHECK(!emulated_is_limp(&machine) && !atomic_load(&pulse_of(&h)->rescued));
+  REQUIRE(emulated_tell(&machine, "report 0 B3M"));
+  h.ops->stop(h.self);
+  hap_device_close(h.device);
+  CHECK(open_device(&h, "", &detail)); /* who opens it zeroes it */
+  CHECK(emulated_await(&machine, true));
+  hap_device_close(h.device);
+}
+
 /* ---- a whole session ---- */
 
 #define SAMPLES 200
@@ -459,6 +652,10 @@ static hap_fault force_feel(rig *r, emulated *e, felt *seen)
     forces_compare(r, e, seen);
     if (hap_session_stats(r->session, &stats, sizeof stats) < HAP_OK) {
       return HAP_FAULT_WORLD;
+    }
+    if (stats.faults.fault == HAP_FAULT_BLOCKED) { /* the machine, and not the device */
+      (void)hap_session_reset_fault(r->session);
+      stats.faults.fault = HAP_FAULT_NONE;
     }
   } while (seen->samples < SAMPLES && stats.faults.fault == HAP_FAULT_NONE &&
            emulated_clock() < end);
@@ -566,6 +763,10 @@ SET_UP
 {
   static const char *const arguments[] = {"--hand", "hold", "--first-count", "32700", "--fifo",
                                           "40",     NULL};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.log = log_keep;
+  (void)hap_hooks_set(&hooks);
   signal(SIGPIPE, SIG_IGN);
   tap_at_end(machine_stop);
   return emulated_start(&machine, arguments) ||

@@ -336,7 +336,11 @@ int main(int argc, char **argv)
   }
   switch (options.action) {
     case RUN_LIST:
-      run_list_print(stdout);
+      run_list_print(stdout, false);
+      break;
+    case RUN_PROBE:
+      fputs("hapode-run: bytes are sent to the serial ports of all USB adapters\n", stderr);
+      run_list_print(stdout, true);
       break;
     case RUN_HELP:
       run_options_help(stdout);

@@ -2,9 +2,11 @@
  * SPDX-License-Identifier: MIT */
 #include "tools/run_list.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 #include "device/device.h"
+#include "plugins/spidar/serial.h"
 #include "scenes/scenes.h"
 #include "tools/run_effects.h"
 
@@ -52,8 +54,29 @@ static void print_scene(const scene_parameters *p, FILE *out)
   }
 }
 
-/* Of hardware: whether it is there, and else why it cannot be used. */
-static void print_device(const char *name, const char *text, FILE *out)
+/* A port may belong to any machine: it is not opened. */
+static void print_ports(FILE *out)
+{
+  char path[HAPI_SPIDAR_PATH_MAX];
+  hapi_spidar_identity port;
+  int at = 0;
+  int count = 0;
+  const char *named = getenv("HAPODE_SPIDAR_PORT");
+  if (named != NULL && *named != '\0') {
+    fprintf(out, "%15smay be on %s, by HAPODE_SPIDAR_PORT\n", "", named);
+  }
+  for (; hapi_spidar_identity_next(HAPI_SPIDAR_SYSFS, &at, path, sizeof path, &port); ++count) {
+    fprintf(out, "%15smay be on %s: %s, %s, socket %s%s%s; not asked\n", "", path,
+            port.about[0] != '\0' ? port.about : "USB adapter", port.product, port.place,
+            port.serial[0] != '\0' ? ", serial number " : "", port.serial);
+  }
+  fprintf(out, "%15s%s\n", "",
+          count > 0 ? "--list-probe asks, and sends bytes to each of these ports"
+                    : "there is no serial port of a USB adapter");
+}
+
+/* Of hardware, asked: whether it is there, and else why it cannot be used. */
+static void print_device(const char *name, const char *text, FILE *out, bool probe)
 {
   const hap_device_ops *ops = hapi_registry_find(name, strlen(name));
   hap_device *device = NULL;
@@ -61,6 +84,10 @@ static void print_device(const char *name, const char *text, FILE *out)
   hap_detail detail = {""};
   fprintf(out, "  %-12s %s\n", name, text != NULL ? text : "");
   if (ops == NULL || ops->pacing == HAP_PACING_VIRTUAL) {
+    return;
+  }
+  if (!probe) {
+    print_ports(out);
     return;
   }
   if (hap_device_open(name, &device, &detail) < HAP_OK) {
@@ -72,7 +99,7 @@ static void print_device(const char *name, const char *text, FILE *out)
   hap_device_close(device);
 }
 
-void run_list_print(FILE *out)
+void run_list_print(FILE *out, bool probe)
 {
   const scene_parameters *p;
   const char *name;
@@ -87,7 +114,7 @@ void run_list_print(FILE *out)
   }
   fputs("\ndevices:\n", out);
   for (size_t i = 0; (name = hap_device_name_at(i, &text)) != NULL; ++i) {
-    print_device(name, text, out);
+    print_device(name, text, out, probe);
   }
   fputs("\neffects (NAME=on, off or auto, which is the default):\n", out);
   run_effects_list(out);

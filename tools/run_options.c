@@ -350,6 +350,10 @@ static const option table[] = {
      offsetof(run_options, rig.def.rt_priority), 0, 0},
     {"--list", NULL, "scenes with their parameters, models, devices, effects", take_constant,
      offsetof(run_options, action), RUN_LIST, 0},
+    {"--list-probe", NULL,
+     "as --list, and asks the serial port of each USB adapter for boards: bytes are\n"
+     "sent there, also to machines that are no haptic devices",
+     take_constant, offsetof(run_options, action), RUN_PROBE, 0},
     {"--help", NULL, "this text", take_constant, offsetof(run_options, action), RUN_HELP, 0},
     {"--version", NULL, "version of the library", take_constant, offsetof(run_options, action),
      RUN_VERSION, 0},
@@ -380,9 +384,9 @@ static hap_status fail_unknown(const char *argument, hap_detail *detail)
 /* What a recording does not answer. */
 static bool beside_play(const option *o)
 {
-  static const char *const names[] = {"--play",   "--play-incomplete", "--seconds", "--trace",
-                                      "--plot",   "--black-box",       "--list",    "--help",
-                                      "--version"};
+  static const char *const names[] = {"--play", "--play-incomplete", "--seconds", "--trace",
+                                      "--plot", "--black-box",       "--list",    "--list-probe",
+                                      "--help", "--version"};
   bool found = false;
   for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
     found = found || strcmp(names[i], o->name) == 0;

@@ -14,6 +14,7 @@
 typedef enum run_action {
   RUN_SESSION = 0,
   RUN_LIST,
+  RUN_PROBE, /* a list for which serial ports are asked */
   RUN_HELP,
   RUN_VERSION
 } run_action;

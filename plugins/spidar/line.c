@@ -130,6 +130,20 @@ hap_status hapi_spidar_line_find(const hapi_spidar_port *port, hapi_spidar_board
   return HAP_OK;
 }
 
+int hapi_spidar_line_compare(const hapi_spidar_port *port, const hapi_spidar_boards *boards)
+{
+  for (int i = 0; i < boards->count; ++i) {
+    int model = ask_often(port, boards->id[i]);
+    if (model <= 0) {
+      return model < 0 ? model : -EAGAIN;
+    }
+    if (model != boards->model[i]) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
 /* ---- cycles ---- */
 
 static int tell_lengths(const hapi_spidar_port *port, int id, int model)

@@ -39,6 +39,10 @@ typedef struct hapi_spidar_line {
 HAP_NODISCARD hap_status hapi_spidar_line_find(const hapi_spidar_port *port,
                                                hapi_spidar_boards *out, hap_detail *detail);
 
+/* [any, also a signal handler] Asks the ids of the boards, and no others. 1: they answer as those
+ * models; 0: another one answers for one of them; -EAGAIN: one does not answer; -errno. */
+int hapi_spidar_line_compare(const hapi_spidar_port *port, const hapi_spidar_boards *boards);
+
 /* [control] Tells all boards the lengths of each other's commands, and makes ready for cycles. */
 HAP_NODISCARD hap_status hapi_spidar_line_begin(hapi_spidar_line *line,
                                                 const hapi_spidar_port *port,

@@ -134,6 +134,7 @@ static hap_status find_boards(hapi_spidar_device *device, const char *path, hap_
     hapi_spidar_serial_shut(&device->serial);
     return hapi_fail(detail, status, "spidar: %.200s: %.200s", path, why.text);
   }
+  hapi_spidar_identity_at(HAPI_SPIDAR_SYSFS, path, &device->serial.identity);
   return HAP_OK;
 }
 
@@ -264,7 +265,7 @@ hap_status hapi_spidar_configure(hapi_spidar_device *device, const char *args, h
   }
   set_limits(device, entries);
   prepare_zeros(device);
-  hapi_spidar_serial_force(&device->serial, device->zeros, device->zero_count);
+  (void)hapi_spidar_serial_force(&device->serial, device->zeros, device->zero_count);
   return HAP_OK;
 }
 

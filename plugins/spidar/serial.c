@@ -138,6 +138,22 @@ hap_status hapi_spidar_serial_open(hapi_spidar_serial *serial, const char *path,
   return status;
 }
 
+int hapi_spidar_serial_attach(hapi_spidar_serial *serial, const char *path)
+{
+  int fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (fd < 0) {
+    return -errno;
+  }
+  int error = !isatty(fd) ? ENOTTY : flock(fd, LOCK_EX | LOCK_NB) != 0 || !make_raw(fd) ? errno : 0;
+  if (error != 0) {
+    close(fd);
+    return -error;
+  }
+  port_settle(fd);
+  serial->fd = fd;
+  return 0;
+}
+
 void hapi_spidar_serial_shut(hapi_spidar_serial *serial)
 {
   int nothing = open("/dev/null", O_RDWR | O_CLOEXEC);
@@ -219,14 +235,16 @@ void hapi_spidar_serial_port(hapi_spidar_serial *serial, hapi_spidar_port *out)
                             serial_await, serial_now,  serial_flush};
 }
 
-void hapi_spidar_serial_force(const hapi_spidar_serial *serial, const uint8_t *bytes, int count)
+bool hapi_spidar_serial_force(const hapi_spidar_serial *serial, const uint8_t *bytes, int count)
 {
   int before = errno; /* of what was interrupted */
+  ssize_t sent = 0;
   for (int i = 0; i < FORCE_TRIES; ++i) {
-    ssize_t sent = write(serial->fd, bytes, (size_t)count);
+    sent = write(serial->fd, bytes, (size_t)count);
     if (sent == count || (sent < 0 && errno != EAGAIN && errno != EINTR)) {
       break;
     }
   }
   errno = before;
+  return sent == count;
 }

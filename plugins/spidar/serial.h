@@ -5,6 +5,7 @@
 
 /* A serial port of Linux, 2 Mbit/s, raw. */
 
+#include "plugins/spidar/identity.h"
 #include "plugins/spidar/line.h"
 
 #define HAPI_SPIDAR_PATH_MAX 256
@@ -14,6 +15,7 @@
 typedef struct hapi_spidar_serial {
   int fd;
   char path[HAPI_SPIDAR_PATH_MAX];
+  hapi_spidar_identity identity; /* of the adapter, when boards were found behind it */
 } hapi_spidar_serial;
 
 HAP_NODISCARD hap_status hapi_spidar_serial_init(hapi_spidar_serial *serial, hap_detail *detail);
@@ -29,8 +31,13 @@ void hapi_spidar_serial_shut(hapi_spidar_serial *serial);
  * read(2). */
 void hapi_spidar_serial_port(hapi_spidar_serial *serial, hapi_spidar_port *out);
 
-/* [any, also a signal handler] Tries a few times when the port is being written to. */
-void hapi_spidar_serial_force(const hapi_spidar_serial *serial, const uint8_t *bytes, int count);
+/* [any, also a signal handler] Opens path for this process alone, without waiting. The caller
+ * closes fd. 0 or -errno; -EWOULDBLOCK: another process has it. */
+int hapi_spidar_serial_attach(hapi_spidar_serial *serial, const char *path);
+
+/* [any, also a signal handler] Tries a few times when the port is being written to. False: the port
+ * did not take all. */
+bool hapi_spidar_serial_force(const hapi_spidar_serial *serial, const uint8_t *bytes, int count);
 
 /* Latency timer of the port's USB adapter in ms; < 0: it has none that can be seen. */
 int hapi_spidar_serial_latency(const char *path);

@@ -23,6 +23,7 @@
 #define WRITE_LATE_S 0.01 /* a longer pause between two writes counts as this */
 #define LITTLE 0.01       /* of the greatest force */
 #define WRAP 65536.0
+#define RESCUED_TEXT "the port came back, and the guard has taken the force off there"
 
 _Static_assert(ATOMIC_BOOL_LOCK_FREE == 2, "zero is called from signal handlers");
 
@@ -45,7 +46,7 @@ static int send_currents(hapi_spidar_device *device)
   int sent = hapi_spidar_line_send(&device->line, device->current);
   atomic_fetch_add(&device->guard.pulse->beats, 1);
   if (atomic_load(&device->zeroed)) {
-    hapi_spidar_serial_force(&device->serial, device->zeros, device->zero_count);
+    (void)hapi_spidar_serial_force(&device->serial, device->zeros, device->zero_count);
   }
   return sent;
 }
@@ -76,7 +77,7 @@ static void spidar_zero(void *self)
   hapi_spidar_device *device = self;
   atomic_store(&device->zeroed, true);
   atomic_store(&device->guard.pulse->pulling, false);
-  hapi_spidar_serial_force(&device->serial, device->zeros, device->zero_count);
+  (void)hapi_spidar_serial_force(&device->serial, device->zeros, device->zero_count);
 }
 
 /* ---- where the grip is ---- */
@@ -147,7 +148,7 @@ static bool needs_restart(const hapi_spidar_device *device)
 {
   int cause = atomic_load(&device->cause);
   return cause == HAPI_SPIDAR_HUNG_UP || cause == HAPI_SPIDAR_JUMPED ||
-         cause == HAPI_SPIDAR_STALLED;
+         cause == HAPI_SPIDAR_STALLED || cause == HAPI_SPIDAR_GUARD_LOST;
 }
 
 /* What has come, into pose and twist. */
@@ -196,6 +197,9 @@ static hap_status spidar_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   }
   if (atomic_load(&device->guard.pulse->stalled)) {
     return device_fail(device, HAPI_SPIDAR_STALLED);
+  }
+  if (hapi_spidar_guard_is_lost(&device->guard)) {
+    return device_fail(device, HAPI_SPIDAR_GUARD_LOST);
   }
   hap_status status = take_answer(device, time_ns);
   hap_status asked = needs_restart(device) ? HAP_OK : boards_ask(device);
@@ -326,6 +330,10 @@ static bool device_reopen(hapi_spidar_device *device)
   char path[HAPI_SPIDAR_PATH_MAX];
   memcpy(path, device->serial.path, sizeof path);
   hapi_spidar_serial_shut(&device->serial);
+  char name[HAPI_SPIDAR_PATH_MAX]; /* that its adapter has now */
+  if (hapi_spidar_identity_find(HAPI_SPIDAR_SYSFS, &device->serial.identity, name, sizeof name)) {
+    memcpy(path, name, sizeof path);
+  }
   if (hapi_spidar_serial_open(&device->serial, path, &detail) < HAP_OK) {
     (void)device_fail(device, HAPI_SPIDAR_NOT_OPENED);
     return false;
@@ -435,8 +443,8 @@ static void let_go(hapi_spidar_device *device)
 {
   device->running = false;
   spidar_zero(device);
-  hapi_spidar_serial_force(&device->serial, device->zeros, device->zero_count);
-  hapi_spidar_guard_end(&device->guard);
+  bool zeroed = hapi_spidar_serial_force(&device->serial, device->zeros, device->zero_count);
+  hapi_spidar_guard_end(&device->guard, zeroed);
 }
 
 hapi_spidar_cause hapi_spidar_begin(hapi_spidar_device *device, const hapi_spidar_port *port)
@@ -452,6 +460,30 @@ hapi_spidar_cause hapi_spidar_begin(hapi_spidar_device *device, const hapi_spida
   return HAPI_SPIDAR_WELL;
 }
 
+/* No guard, no force, unless the user wants it so. */
+static bool guard_begin(hapi_spidar_device *device)
+{
+  const hapi_spidar_guard_def def = {.port = device->serial.fd,
+                                     .path = device->serial.path,
+                                     .identity = &device->serial.identity,
+                                     .boards = &device->boards,
+                                     .zeros = device->zeros,
+                                     .zero_count = device->zero_count,
+                                     .stall_s = device->settings.stall};
+  if (atomic_exchange(&device->guard.pulse->rescued, false)) {
+    hapi_log(HAP_LOG_WARNING, "spidar: %.200s: " RESCUED_TEXT, device->serial.path);
+  }
+  if (device->settings.stall > 0.0) {
+    return hapi_spidar_guard_start(&device->guard, &def);
+  }
+  hapi_log(
+      HAP_LOG_WARNING,
+      "spidar: %.200s: no guard process, as stall=0 asks for: when this program is killed, the "
+      "motors keep their currents",
+      device->serial.path);
+  return true;
+}
+
 static hap_status spidar_start(void *self)
 {
   hapi_spidar_device *device = self;
@@ -460,16 +492,12 @@ static hap_status spidar_start(void *self)
   }
   set_cause(device, HAPI_SPIDAR_WELL);
   atomic_store(&device->told, HAPI_SPIDAR_WELL);
-  if (device->settings.stall > 0.0 &&
-      !hapi_spidar_guard_start(&device->guard, device->serial.fd, device->zeros, device->zero_count,
-                               device->settings.stall)) {
-    hapi_log(HAP_LOG_WARNING,
-             "spidar: there is no guard process: when this one is killed, the "
-             "motors keep their currents");
-  }
   hapi_spidar_port port;
   hapi_spidar_serial_port(&device->serial, &port);
-  hapi_spidar_cause cause = hapi_spidar_begin(device, &port);
+  hapi_spidar_cause cause = HAPI_SPIDAR_UNGUARDED;
+  if (guard_begin(device)) {
+    cause = hapi_spidar_begin(device, &port);
+  }
   if (cause != HAPI_SPIDAR_WELL) {
     let_go(device);
     return device_fail(device, cause);
@@ -551,6 +579,12 @@ static const char *text_of(hapi_spidar_cause cause)
              "was the grip at home at the start?";
     case HAPI_SPIDAR_STALLED:
       return "nothing was written for too long and the guard took the force off";
+    case HAPI_SPIDAR_UNGUARDED:
+      return "the guard process, which takes the force off when this program dies, could not be "
+             "started: are there too many processes or open files? stall=0 goes without it";
+    case HAPI_SPIDAR_GUARD_LOST:
+      return "the guard process, which takes the force off when this program dies, has gone: was "
+             "it killed? A restart of the device starts it again";
     case HAPI_SPIDAR_NOT_OPENED:
       return "the port does not open or no board answers";
     case HAPI_SPIDAR_OTHER_BOARDS:
@@ -563,8 +597,12 @@ static void spidar_explain(void *self, hap_detail *out)
 {
   hapi_spidar_device *device = self;
   const char *text = text_of((hapi_spidar_cause)atomic_load(&device->told));
+  int error = atomic_load(&device->guard.error);
+  bool unguarded = atomic_load(&device->told) == HAPI_SPIDAR_UNGUARDED;
   if (text[0] != '\0') {
-    (void)hapi_fail(out, HAP_ERROR_DEVICE, "%.200s: %s", device->serial.path, text);
+    (void)hapi_fail(out, HAP_ERROR_DEVICE, "%.100s: %s%s%.60s%s", device->serial.path, text,
+                    unguarded ? ": " : "", unguarded ? strerror(error) : "",
+                    atomic_load(&device->guard.pulse->rescued) ? "; " RESCUED_TEXT : "");
   }
 }
 

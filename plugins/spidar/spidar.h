@@ -22,6 +22,8 @@ typedef enum hapi_spidar_cause {
   HAPI_SPIDAR_JUMPED,      /* positions that no string can have reached */
   HAPI_SPIDAR_MISFIT,      /* lengths that fit no pose, with all strings taut */
   HAPI_SPIDAR_STALLED,     /* the guard took the force off */
+  HAPI_SPIDAR_UNGUARDED,   /* start: there is no guard process */
+  HAPI_SPIDAR_GUARD_LOST,  /* the guard process has gone */
   HAPI_SPIDAR_NOT_OPENED,  /* start: the port does not open, or no board answers */
   HAPI_SPIDAR_OTHER_BOARDS /* start: not the boards that it was opened with */
 } hapi_spidar_cause;
