@@ -37,12 +37,12 @@ typedef struct felt_book {
   atomic_int ever_holds; /* since this was last set to 0 */
 
   /* What the hand felt. */
-  double force[3];  /* N, held */
+  double force[3];  /* N, held, by the loop: felt_force knows of a zero */
   double peak;      /* N */
   double steepest;  /* N, between two writes */
   int bad;          /* writes that were not finite, beyond the limit or too steep */
   int writes;       /* that it took */
-  int zeros;        /* calls of zero */
+  atomic_int zeros; /* calls of zero */
   double at[3];     /* m, the hand */
   bool placed;      /* it was read once */
   double work;      /* J, that the force did on the hand */
@@ -52,6 +52,7 @@ typedef struct felt_book {
 } felt_book;
 
 static felt_book felt;
+static atomic_int felt_let_go; /* by zero, of any thread, since the last write */
 
 static inline hap_status felt_open(const char *args, void **self, hap_detail *detail)
 {
@@ -77,8 +78,16 @@ static inline hap_status felt_start(void *self)
   return felt.hand->start(felt.self);
 }
 
+static inline void felt_drop(void)
+{
+  if (atomic_load(&felt_let_go) != 0) {
+    memset(felt.force, 0, sizeof felt.force);
+  }
+}
+
 static inline void felt_move(const double at[3])
 {
+  felt_drop();
   double way[3];
   hapi_v3_sub(at, felt.at, way);
   double work = felt.placed ? hapi_v3_dot(felt.force, way) : 0.0;
@@ -114,6 +123,7 @@ static inline hap_status felt_read(void *self, int64_t time_ns, hap_pose *pose, 
 static inline void felt_hold(const double force[3])
 {
   hapi_v3_copy(force, felt.force);
+  atomic_store(&felt_let_go, 0);
   bool holds = hapi_v3_norm(force) > 0.0;
   atomic_store(&felt.holds, holds);
   if (holds) {
@@ -128,6 +138,7 @@ static inline hap_status felt_write(void *self, const hap_wrench *wanted, hap_wr
   if (atomic_load(&felt.fail_write) != 0 || atomic_load(&felt.lost) != 0) {
     return HAP_ERROR_DEVICE;
   }
+  felt_drop();
   hapi_v3_sub(wanted->force, felt.force, change);
   double force = hapi_v3_norm(wanted->force);
   double step = hapi_v3_norm(change);
@@ -142,10 +153,10 @@ static inline hap_status felt_write(void *self, const hap_wrench *wanted, hap_wr
 
 static inline void felt_zero(void *self)
 {
-  static const double none[3] = {0.0, 0.0, 0.0};
   (void)self;
-  ++felt.zeros;
-  felt_hold(none);
+  atomic_fetch_add(&felt.zeros, 1);
+  atomic_store(&felt_let_go, 1);
+  atomic_store(&felt.holds, 0);
   felt.hand->zero(felt.self);
 }
 
@@ -208,6 +219,7 @@ static inline void felt_init(felt_stage *f, hap_drive drive, bool body)
 {
   memset(f, 0, sizeof *f);
   memset(&felt, 0, sizeof felt);
+  atomic_store(&felt_let_go, 0);
   stage_init(&f->s, drive);
   felt_set_box(f, body);
   pointer_defs_init(&f->def, &f->pointer_expert, &f->pointer_research);
@@ -250,6 +262,7 @@ static inline uint32_t felt_guard(felt_stage *f)
 
 static inline double felt_force(void)
 {
+  felt_drop();
   return hapi_v3_norm(felt.force);
 }
 

@@ -59,20 +59,20 @@ TEST(each_device_is_zeroed_once_an_emergency)
   CHECK(hapi_emergency_add(&other_ops, &devices[2]));
   hap_emergency_zero();
   counts_are(2, 1, 1);
-  hapi_emergency_remove(&counted_ops, &devices[0]);
+  (void)hapi_emergency_remove(&counted_ops, &devices[0]);
   hap_emergency_zero();
   counts_are(2, 2, 2);
-  hapi_emergency_remove(&counted_ops, &devices[0]); /* it is not there */
-  hapi_emergency_remove(&counted_ops, &devices[2]); /* has other ops */
-  hapi_emergency_remove(&other_ops, &devices[1]);
+  (void)hapi_emergency_remove(&counted_ops, &devices[0]); /* it is not there */
+  (void)hapi_emergency_remove(&counted_ops, &devices[2]); /* has other ops */
+  (void)hapi_emergency_remove(&other_ops, &devices[1]);
   hap_emergency_zero();
   counts_are(2, 3, 3);
   CHECK(hapi_emergency_add(&counted_ops, &devices[0])); /* a place that was free again */
   hap_emergency_zero();
   counts_are(3, 4, 4);
-  hapi_emergency_remove(&counted_ops, &devices[0]);
-  hapi_emergency_remove(&counted_ops, &devices[1]);
-  hapi_emergency_remove(&other_ops, &devices[2]);
+  (void)hapi_emergency_remove(&counted_ops, &devices[0]);
+  (void)hapi_emergency_remove(&counted_ops, &devices[1]);
+  (void)hapi_emergency_remove(&other_ops, &devices[2]);
   hap_emergency_zero();
   counts_are(3, 4, 4);
   CHECK(hapi_emergencies() == before + 7);
@@ -89,7 +89,7 @@ TEST(there_is_room_for_64)
   hap_emergency_zero();
   for (int i = 0; i < HAPI_EMERGENCY_DEVICES; ++i) {
     CHECK(atomic_load(&devices[i].zeros) == 1);
-    hapi_emergency_remove(&counted_ops, &devices[i]);
+    (void)hapi_emergency_remove(&counted_ops, &devices[i]);
   }
   CHECK(atomic_load(&devices[HAPI_EMERGENCY_DEVICES].zeros) == 0);
 }
@@ -104,7 +104,7 @@ static atomic_int removed;
 
 static void *remove_first(void *unused)
 {
-  hapi_emergency_remove(&counted_ops, &devices[0]);
+  (void)hapi_emergency_remove(&counted_ops, &devices[0]);
   atomic_store(&removed, 1);
   return unused;
 }

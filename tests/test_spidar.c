@@ -13,6 +13,7 @@
 #include <hapode/hapode.h>
 
 #include "base/clock.h"
+#include "base/safety.h"
 #include "base/vec.h"
 #include "device/device.h"
 #include "plugins/spidar/spidar.h"
@@ -342,6 +343,11 @@ TEST(a_cable_is_pulled_and_put_in_again)
 
 /* ---- the guard ---- */
 
+static hapi_spidar_pulse *pulse_of(const hands *h)
+{
+  return ((hapi_spidar_device *)h->self)->guard.pulse;
+}
+
 /* Ends as the process that drives the device ends. */
 static void die_with_force(int number)
 {
@@ -362,6 +368,52 @@ static void die_with_force(int number)
   CHECK(kill(child, number) == 0);
   int status = 0;
   CHECK(waitpid(child, &status, 0) == child && WIFSIGNALED(status) && WTERMSIG(status) == number);
+  CHECK(emulated_await(&machine, true));
+}
+
+/* Ends with its force on, and the first zeros of the guard lose a byte. */
+TEST(a_zero_that_loses_a_byte_is_sent_again)
+{
+  char command[64];
+  int status = 0;
+  pid_t child = fork();
+  if (child == 0) {
+    hands h;
+    hap_detail detail = {""};
+    if (!open_device(&h, ",timeout=10,stall=30", &detail) || h.ops->start(h.self) < HAP_OK) {
+      _exit(1);
+    }
+    for (;;) {
+      (void)hands_push(&h, 3.0, 100);
+    }
+  }
+  CHECK(emulated_await(&machine, false));
+  emulated_sleep(0.7); /* beyond start */
+  CHECK(kill(child, SIGSTOP) == 0);
+  emulated_sleep(0.1);
+  /* After the flush and the zeros before it: in the currents of the first board. */
+  snprintf(command, sizeof command, "lose command %d",
+           HAPI_SPIDAR_FRAME_MAX + HAPI_SPIDAR_ZEROS_BEFORE + 1);
+  REQUIRE(emulated_tell(&machine, command));
+  CHECK(!emulated_is_limp(&machine));
+  CHECK(kill(child, SIGKILL) == 0 && waitpid(child, &status, 0) == child);
+  CHECK(emulated_await(&machine, true));
+}
+
+TEST(a_guard_is_deaf_to_signals_meant_for_the_program)
+{
+  static const int signals[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGPIPE, SIGALRM};
+  hands h;
+  hap_detail detail = {""};
+  REQUIRE(open_device(&h, ",timeout=5,stall=10", &detail));
+  REQUIRE(h.ops->start(h.self) == HAP_OK);
+  pid_t guard = (pid_t)atomic_load(&pulse_of(&h)->guard);
+  CHECK(getsid(guard) == guard && guard > 0); /* of no terminal */
+  for (size_t i = 0; i < sizeof signals / sizeof signals[0]; ++i) {
+    CHECK(kill(guard, signals[i]) == 0);
+  }
+  CHECK(hands_push(&h, 1.0, 100) == HAP_OK);
+  hap_device_close(h.device);
   CHECK(emulated_await(&machine, true));
 }
 
@@ -402,9 +454,11 @@ static void log_keep(hap_log_level level, const char *text, void *user)
   snprintf(logged, sizeof logged, "%s", text);
 }
 
-static hapi_spidar_pulse *pulse_of(const hands *h)
+/* Times and counts of the guard process are in docs/safety.md. */
+TEST(no_guard_constant_changes_unnoticed)
 {
-  return ((hapi_spidar_device *)h->self)->guard.pulse;
+  CHECK(HAPI_SAFETY_GUARD_LOOK_S == 0.02 && HAPI_SAFETY_GUARD_STALL_S == 0.5);
+  CHECK(HAPI_SAFETY_GUARD_ROUNDS == 4 && HAPI_SAFETY_GUARD_WAIT_S == 600.0);
 }
 
 TEST(no_guard_no_force)

@@ -40,4 +40,10 @@
 #define HAPI_SAFETY_UNWOKEN_S 0.1     /* s */
 #define HAPI_SAFETY_STOP_WAIT_S 1.0   /* s */
 
+/* ---- the SPIDAR's guard process ---- */
+#define HAPI_SAFETY_GUARD_LOOK_S 0.02  /* s */
+#define HAPI_SAFETY_GUARD_STALL_S 0.5  /* s */
+#define HAPI_SAFETY_GUARD_ROUNDS 4     /* 1 */
+#define HAPI_SAFETY_GUARD_WAIT_S 600.0 /* s */
+
 #endif

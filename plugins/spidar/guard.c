@@ -16,15 +16,15 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/safety.h"
 #include "plugins/spidar/serial.h"
 
-#define LOOK_MS 20
-#define ROUNDS 4 /* of zeros: a byte of one may be lost */
+#define LOOK_MS ((int)(1e3 * HAPI_SAFETY_GUARD_LOOK_S + 0.5))
 #define ROUND_NS 3000000
 #define END_MS 1000
-#define WAIT_LOOKS (600 * 1000 / LOOK_MS) /* for a port that went away, alone */
-#define ASK_LOOKS (500 / LOOK_MS)         /* between two questions to boards that do not answer */
-#define KEPT 4                            /* descriptors */
+#define WAIT_LOOKS (1e3 * HAPI_SAFETY_GUARD_WAIT_S / LOOK_MS) /* for a port, alone */
+#define ASK_LOOKS (500 / LOOK_MS) /* between two questions to boards that do not answer */
+#define KEPT 4                    /* descriptors */
 
 enum {
   WORD_END = 'e',  /* the port was zeroed */
@@ -95,7 +95,7 @@ static bool send_zeros(const watch *w, int port)
   static const uint8_t flush[HAPI_SPIDAR_FRAME_MAX]; /* ends a command that went out in part */
   const struct timespec pause = {0, ROUND_NS};
   bool sent = false;
-  for (int i = 0; i < ROUNDS; ++i) {
+  for (int i = 0; i < HAPI_SAFETY_GUARD_ROUNDS; ++i) {
     struct pollfd room = {port, POLLOUT, 0};
     (void)poll(&room, 1, LOOK_MS);
     if (i == 0) {
@@ -206,7 +206,7 @@ static void look_at_pulse(watch *w, unsigned *beats, int *looks)
 }
 
 /* What came from the process that drives the device, and whether it still does. */
-static char channel_read(watch *w, short channel, short parent)
+static int channel_read(watch *w, short channel, short parent)
 {
   char word = 0;
   ssize_t said = channel != 0 ? read(w->channel, &word, 1) : -1;
@@ -228,7 +228,7 @@ static void guard_main(watch *w)
   for (;;) {
     struct pollfd files[3] = {{w->channel, POLLIN, 0}, {w->parent, POLLIN, 0}, {w->port, 0, 0}};
     (void)poll(files, 3, LOOK_MS);
-    char word = channel_read(w, files[0].revents, files[1].revents);
+    int word = channel_read(w, files[0].revents, files[1].revents);
     if (word == WORD_END) {
       return; /* the port was zeroed and is let go */
     }
@@ -324,7 +324,7 @@ bool hapi_spidar_guard_is_lost(const hapi_spidar_guard *guard)
 
 void hapi_spidar_guard_end(hapi_spidar_guard *guard, bool zeroed)
 {
-  char word = zeroed ? WORD_END : WORD_LEFT;
+  const char word = zeroed ? WORD_END : WORD_LEFT;
   if (guard->channel < 0) {
     return;
   }

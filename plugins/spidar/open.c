@@ -4,12 +4,12 @@
 #include <string.h>
 
 #include "base/log.h"
+#include "base/safety.h"
 #include "base/vec.h"
 #include "plugins/common/arguments.h"
 #include "plugins/spidar/spidar.h"
 
 #define TIMEOUT 0.02 /* s */
-#define STALL 0.5    /* s */
 #define PORTS_MAX 16 /* that are looked at */
 
 enum argument {
@@ -33,7 +33,8 @@ static const hapi_argument known_arguments[ARGUMENT_COUNT] = {
     [TIMEOUT_ARGUMENT] = {"timeout", HAPI_ARGUMENT_NUMBER, false, 2e-3, 10.0,
                           "seconds from 0.002 to 10", .number = {TIMEOUT}},
     [STALL_ARGUMENT] = {"stall", HAPI_ARGUMENT_NUMBER, false, 0.0, 60.0,
-                        "seconds from 0.05 to 60, or 0: no guard", .number = {STALL}},
+                        "seconds from 0.05 to 60, or 0: no guard",
+                        .number = {HAPI_SAFETY_GUARD_STALL_S}},
     [MAX_FORCE] = {"max_force", HAPI_ARGUMENT_NUMBER, false, 1e-3, 1e3, "N from 0.001 to 1000"},
     [MAX_TORQUE] = {"max_torque", HAPI_ARGUMENT_NUMBER, false, 1e-6, 1e3, "N m from 1e-6 to 1000"},
 };
