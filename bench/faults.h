@@ -63,21 +63,41 @@ typedef enum faults_kind {
   FAULTS_DUTY_OWN  /* the same without what a plain loop of ODE would take */
 } faults_kind;
 
-/* The hand's position [m] and velocity [m/s] at a time [s]. */
-typedef void (*faults_hand_fn)(double t, double out_position[3], double out_velocity[3]);
+/* A way along an axis, from begin to end. */
+typedef struct faults_glide {
+  enum {
+    X,
+    Y,
+    Z
+  } axis;
+  double begin; /* s */
+  double end;
+  double way; /* m */
+} faults_glide;
+
+#define FAULTS_GLIDES 3
+
+typedef struct faults_path {
+  double from[3];                     /* m */
+  faults_glide glides[FAULTS_GLIDES]; /* the first without a way ends them */
+} faults_path;
+
+/* Changes the hand's position [m] and velocity [m/s] at a time [s]. */
+typedef void (*faults_hand_fn)(double t, double io_position[3], double io_velocity[3]);
 
 /* What an application does before and after a step of its world from begin to end [s]. */
 typedef void (*faults_drive_fn)(faults_world *w, double begin, double end);
 
 typedef struct faults_motion {
-  faults_hand_fn hand;
-  double radius;       /* m */
-  double stiffness;    /* N/m */
-  double damping;      /* N s/m */
-  double friction;     /* of the pointer */
-  double max_force;    /* N; 0: the library's default */
-  bool cube_tool;      /* a hull, a cube of edge 2 radius, in the place of a sphere */
-  const char *through; /* name of a coupling; NULL: the library's default */
+  const faults_path *path; /* NULL: it rests at the origin */
+  faults_hand_fn hand;     /* after the path; may be NULL */
+  double radius;           /* m */
+  double stiffness;        /* N/m */
+  double damping;          /* N s/m */
+  double friction;         /* of the pointer */
+  double max_force;        /* N; 0: the library's default */
+  bool cube_tool;          /* a hull, a cube of edge 2 radius, in the place of a sphere */
+  const char *through;     /* name of a coupling; NULL: the library's default */
 } faults_motion;
 
 typedef struct faults_check {
@@ -137,6 +157,10 @@ void faults_world_destroy(faults_world *w); /* zeroed allowed */
 
 /* As a classic near callback does: the contact joints of all pairs into own_contacts. */
 void faults_world_collide(faults_world *w);
+
+/* Where the hand is at a time, and its velocity. */
+void faults_hand(const faults_motion *motion, double t, double out_position[3],
+                 double out_velocity[3]);
 
 bool faults_run_create(const faults_scene *scene, faults_run *out);
 void faults_run_free(faults_run *r); /* zeroed allowed */

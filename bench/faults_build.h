@@ -17,10 +17,24 @@ dBodyID faults_body(faults_world *w, double mass, const double size[3], const do
 /* body NULL: it stands in the world, at. Else it is the body's, about its middle. */
 dGeomID faults_box(faults_world *w, dBodyID body, const double size[3], const double at[3]);
 
-void faults_hand_at(double out_position[3], double out_velocity[3], double x, double y, double z);
-
-/* Adds a way with soft ends along one axis, from begin to end [s]. */
-void faults_glide(double t, double begin, double end, double way, double *io_position,
-                  double *io_velocity);
+/* Arguments: a path or NULL, then other members. */
+#define FINGER(...)                                          \
+  {                                                          \
+    .radius = 0.01, .stiffness = 1000.0, .path = __VA_ARGS__ \
+  }
+#define FINGERTIP(...)                                        \
+  {                                                           \
+    .radius = 0.005, .stiffness = 1000.0, .path = __VA_ARGS__ \
+  }
+/* Arguments: kind, bound, then other members. */
+#define JUDGED(...) \
+  {                 \
+    __VA_ARGS__     \
+  }
+/* Arguments: the bound, then other members. */
+#define WITHIN(...)                            \
+  {                                            \
+    .kind = FAULTS_FORCE, .bound = __VA_ARGS__ \
+  }
 
 #endif

@@ -559,7 +559,7 @@ bool faults_reference_run(const faults_scene *scene, double rate_hz, faults_run 
     double t = (double)n * h;
     double velocity[3];
     double moved[3];
-    scene->motion.hand(t, p->centre, velocity);
+    faults_hand(&scene->motion, t, p->centre, velocity);
     vector_between(before, p->centre, moved);
     memcpy(before, p->centre, sizeof before);
     pointer_look(p, &w);

@@ -20,11 +20,7 @@ static void block_build(faults_world *w)
 }
 
 /* Down on z = 0: 4 N at 10 mm and 1 kN/m. */
-static void press_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, 0.0, 0.0, 0.012);
-  faults_glide(t, 0.1, 0.4, -0.006, &x[2], &v[2]);
-}
+static const faults_path press_path = {{0.0, 0.0, 0.012}, {{Z, 0.1, 0.4, -0.006}}};
 
 static void cube_build(faults_world *w)
 {
@@ -33,11 +29,7 @@ static void cube_build(faults_world *w)
   faults_box(w, cube, size, (double[3]){0.025, 0.0, 0.0});
 }
 
-static void push_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.011, 0.0, 0.0);
-  faults_glide(t, 0.05, 0.65, 0.06, &x[0], &v[0]);
-}
+static const faults_path push_path = {{-0.011, 0.0, 0.0}, {{X, 0.05, 0.65, 0.06}}};
 
 /* ---- turning bodies, round corners ---- */
 
@@ -57,16 +49,13 @@ static void disc_build(faults_world *w)
   dBodySetAngularVel(disc, 0.0, 0.0, 50.0);
 }
 
-static void rim_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.06, 0.0, 0.0);
-  faults_glide(t, 0.05, 0.15, 0.009, &x[0], &v[0]);
-}
+static const faults_path rim_path = {{-0.06, 0.0, 0.0}, {{X, 0.05, 0.15, 0.009}}};
 
 /* The same with a cube, whose face meets the rim along its height. */
+/* NOLINTNEXTLINE(readability-non-const-parameter): the type of all */
 static void rim_cube_hand(double t, double x[3], double v[3])
 {
-  rim_hand(t, x, v);
+  (void)t, (void)v;
   x[0] -= 0.005;
 }
 
@@ -86,11 +75,7 @@ static void top_build(faults_world *w)
   dBodySetAngularVel(top, 0.0, 0.0, 120.0);
 }
 
-static void top_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.04, 0.0, 0.0);
-  faults_glide(t, 0.05, 0.35, 0.007, &x[0], &v[0]);
-}
+static const faults_path top_path = {{-0.04, 0.0, 0.0}, {{X, 0.05, 0.35, 0.007}}};
 
 /* Round a post at 0.5 m/s with 4 N: along the sides, and in an arc about the edges. */
 static void corner_hand(double t, double x[3], double v[3])
@@ -111,8 +96,8 @@ static void corner_hand(double t, double x[3], double v[3])
     u[0] = -0.5 * sin(angle);
     u[1] = 0.5 * cos(angle);
   }
-  faults_hand_at(x, v, p[0] * cos(turned) - p[1] * sin(turned),
-                 p[0] * sin(turned) + p[1] * cos(turned), 0.0);
+  x[0] = p[0] * cos(turned) - p[1] * sin(turned);
+  x[1] = p[0] * sin(turned) + p[1] * cos(turned);
   v[0] = u[0] * cos(turned) - u[1] * sin(turned);
   v[1] = u[0] * sin(turned) + u[1] * cos(turned);
 }
@@ -175,18 +160,14 @@ static void sheet_mesh_build(faults_world *w)
 }
 
 /* Down until a spring of half the stiffness would give the largest force. */
-static void deep_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, 0.0, 0.0, 0.007);
-  faults_glide(t, 0.05, 0.75, -0.05, &x[2], &v[2]);
-}
+static const faults_path deep_path = {{0.0, 0.0, 0.007}, {{Z, 0.05, 0.75, -0.05}}};
 
 static void hit_hand(double t, double speed, double x[3], double v[3])
 {
   const double begin = 0.05;
   const double stop = -0.016; /* 21 mm deep */
   double at = 0.04 - speed * fmax(t - begin, 0.0);
-  faults_hand_at(x, v, 0.0, 0.0, fmax(at, stop));
+  x[2] = fmax(at, stop);
   v[2] = at > stop && t > begin ? -speed : 0.0;
 }
 
@@ -201,12 +182,8 @@ static void hit_hand_fast(double t, double x[3], double v[3])
 }
 
 /* 12 mm deep over the sheet, whose edge is at x = 0.1, and off it. */
-static void edge_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, 0.07, 0.0, 0.007);
-  faults_glide(t, 0.05, 0.35, -0.014, &x[2], &v[2]);
-  faults_glide(t, 0.4, 0.8, 0.06, &x[0], &v[0]);
-}
+static const faults_path edge_path = {{0.07, 0.0, 0.007},
+                                      {{Z, 0.05, 0.35, -0.014}, {X, 0.4, 0.8, 0.06}}};
 
 #define SHEET_SPEED 2.0
 
@@ -222,7 +199,6 @@ static void flying_build(faults_world *w)
 
 static void flying_hand(double t, double x[3], double v[3])
 {
-  deep_hand(t, x, v);
   x[2] += SHEET_SPEED * t;
   v[2] += SHEET_SPEED;
 }
@@ -278,13 +254,8 @@ static void seam_pair_build(faults_world *w)
 }
 
 /* 2 mm deep along the upper side, over the seam and back. */
-static void seam_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.02, 0.0, 0.011);
-  faults_glide(t, 0.05, 0.15, -0.003, &x[2], &v[2]);
-  faults_glide(t, 0.2, 0.55, 0.04, &x[0], &v[0]);
-  faults_glide(t, 0.6, 0.95, -0.04, &x[0], &v[0]);
-}
+static const faults_path seam_path = {
+    {-0.02, 0.0, 0.011}, {{Z, 0.05, 0.15, -0.003}, {X, 0.2, 0.55, 0.04}, {X, 0.6, 0.95, -0.04}}};
 
 /* An inner corner, of a floor and a wall that stands on it: both push. */
 static void nook_build(faults_world *w)
@@ -293,12 +264,8 @@ static void nook_build(faults_world *w)
   faults_box(w, NULL, (double[3]){0.05, 0.1, 0.1}, (double[3]){0.075, 0.0, 0.05});
 }
 
-static void nook_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, 0.02, 0.0, 0.011);
-  faults_glide(t, 0.05, 0.15, -0.003, &x[2], &v[2]);
-  faults_glide(t, 0.2, 0.6, 0.022, &x[0], &v[0]);
-}
+static const faults_path nook_path = {{0.02, 0.0, 0.011},
+                                      {{Z, 0.05, 0.15, -0.003}, {X, 0.2, 0.6, 0.022}}};
 
 /* ---- height fields ---- */
 
@@ -387,19 +354,11 @@ static void mesh_ridges_build(faults_world *w)
 }
 
 /* 5 N on the level, and along. */
-static void field_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.053, 0.0027, 0.011);
-  faults_glide(t, 0.05, 0.15, -0.006, &x[2], &v[2]);
-  faults_glide(t, 0.2, 1.1, 0.1, &x[0], &v[0]);
-}
+static const faults_path field_path = {{-0.053, 0.0027, 0.011},
+                                       {{Z, 0.05, 0.15, -0.006}, {X, 0.2, 1.1, 0.1}}};
 
 /* Over the ridges, with 3 N on each. */
-static void ridge_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.06, 0.0027, 0.007);
-  faults_glide(t, 0.05, 1.95, 0.12, &x[0], &v[0]);
-}
+static const faults_path ridge_path = {{-0.06, 0.0027, 0.007}, {{X, 0.05, 1.95, 0.12}}};
 
 /* ---- bodies on height fields, meshes that move ---- */
 
@@ -444,12 +403,8 @@ static void crate_on_slope_build(faults_world *w)
   faults_box(w, crate, crate_size, crate_at);
 }
 
-static void slope_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.042, 0.003, 0.016);
-  faults_glide(t, 0.05, 0.75, 0.05, &x[0], &v[0]);
-  faults_glide(t, 0.05, 0.75, 0.05 * SLOPE, &x[2], &v[2]);
-}
+static const faults_path slope_path = {{-0.042, 0.003, 0.016},
+                                       {{X, 0.05, 0.75, 0.05}, {Z, 0.05, 0.75, 0.05 * SLOPE}}};
 
 static void ball_on_field_build(faults_world *w)
 {
@@ -489,11 +444,7 @@ static void mesh_and_box_build(faults_world *w)
   faults_box(w, box, crate_size, (double[3]){0.0, 0.0, 0.0});
 }
 
-static void crate_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.036, 0.003, 0.018);
-  faults_glide(t, 0.05, 0.75, 0.06, &x[0], &v[0]);
-}
+static const faults_path crate_path = {{-0.036, 0.003, 0.018}, {{X, 0.05, 0.75, 0.06}}};
 
 /* ---- the application's own contacts ---- */
 
@@ -513,11 +464,7 @@ static void own_before(faults_world *w, double begin, double end)
   }
 }
 
-static void own_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, 0.0, 0.003, 0.062);
-  faults_glide(t, 0.1, 0.4, -0.006, &x[2], &v[2]);
-}
+static const faults_path own_path = {{0.0, 0.003, 0.062}, {{Z, 0.1, 0.4, -0.006}}};
 
 /* ---- what the application moves ---- */
 
@@ -600,22 +547,16 @@ static void lift_twist_next(faults_world *w, double begin, double end)
   lift_twist_swing(w, end, end + (end - begin));
 }
 
-static void lift_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, 0.0, 0.0, 0.011);
-  faults_glide(t, 0.05, 0.25, -0.004, &x[2], &v[2]);
-}
+static const faults_path lift_path = {{0.0, 0.0, 0.011}, {{Z, 0.05, 0.25, -0.004}}};
 
 static void lift_hand_linear(double t, double x[3], double v[3])
 {
-  lift_hand(t, x, v);
   x[2] += lift_linear(t);
   v[2] += LIFT_SPEED;
 }
 
 static void lift_hand_swing(double t, double x[3], double v[3])
 {
-  lift_hand(t, x, v);
   x[2] += lift_swing(t);
   v[2] += LIFT_SWING * TURN * sin(TURN * t);
 }
@@ -669,352 +610,115 @@ static void feedback_read(faults_world *w, double begin, double end)
   w->told = sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
 }
 
-static void feedback_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, 0.0, 0.0, 0.012);
-  faults_glide(t, 0.05, 0.35, -0.004, &x[2], &v[2]);
-}
+static const faults_path feedback_path = {{0.0, 0.0, 0.012}, {{Z, 0.05, 0.35, -0.004}}};
 
 /* ---- the table ---- */
 
-#define FINGER(h)                                    \
-  {                                                  \
-    .hand = (h), .radius = 0.01, .stiffness = 1000.0 \
+#define HELD          \
+  {                   \
+    FAULTS_HOLD, 0.02 \
   }
-#define FINGERTIP(h)                                  \
-  {                                                   \
-    .hand = (h), .radius = 0.005, .stiffness = 1000.0 \
-  }
-#define WITHIN(b)                      \
-  {                                    \
-    .kind = FAULTS_FORCE, .bound = (b) \
-  }
-#define HELD                           \
-  {                                    \
-    .kind = FAULTS_HOLD, .bound = 0.02 \
-  }
-#define SHEET(text, thick)                                                           \
-  {                                                                                  \
-    .item = 2, .name = (text), .build = sheet_build, .motion = FINGERTIP(deep_hand), \
-    .seconds = 0.8, .check = HELD, .size = (thick)                                   \
-  }
-#define SHEET_THROUGH(text, coupling)                                                           \
-  {                                                                                             \
-    .item = 2, .name = (text), .build = sheet_build,                                            \
-    .motion = {.hand = deep_hand, .radius = 0.005, .stiffness = 1000.0, .through = (coupling)}, \
-    .seconds = 0.8, .check = HELD, .size = 0.001                                                \
-  }
-#define SHEET_MODEL(text, with)                                                                   \
-  {                                                                                               \
-    .item = 2, .name = (text), .build = sheet_build, .motion = FINGERTIP(deep_hand),              \
-    .seconds = 0.8, .check = {.kind = FAULTS_HOLD, .bound = 0.02, .model = (with)}, .size = 0.001 \
-  }
-#define SHEET_TOOL(text, make, h, thick)                                              \
-  {                                                                                   \
-    .item = 2, .name = (text), .build = (make),                                       \
-    .motion = {.hand = (h), .radius = 0.005, .stiffness = 1000.0, .cube_tool = true}, \
-    .seconds = 0.8, .check = HELD, .size = (thick)                                    \
-  }
-#define SHEET_HIT(text, thick, h)                                                            \
-  {                                                                                          \
-    .item = 2, .name = (text), .build = sheet_build, .motion = FINGERTIP(h), .seconds = 0.3, \
-    .check = HELD, .size = (thick)                                                           \
-  }
-
 const faults_scene faults_table[] = {
-    {.item = 0,
-     .name = "press",
-     .build = block_build,
-     .motion = FINGER(press_hand),
-     .seconds = 0.5,
-     .check = WITHIN(0.02)},
-    {.item = 0,
-     .name = "push",
-     .build = cube_build,
-     .motion = FINGER(push_hand),
-     .seconds = 0.8,
-     .check = WITHIN(0.02)},
-    {.item = 1,
-     .name = "disc",
-     .build = disc_build,
-     .motion = FINGERTIP(rim_hand),
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 1,
-     .name = "disc_tool",
-     .build = disc_build,
-     .motion = {.hand = rim_cube_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 1,
-     .name = "top",
-     .build = top_build,
-     .motion = FINGER(top_hand),
-     .seconds = 0.8,
-     .check = {.kind = FAULTS_FORCE, .bound = 0.03, .reference_hz = 128000.0}},
-    {.item = 1,
-     .name = "corner",
-     .build = post_build,
-     .motion = FINGER(corner_hand),
-     .seconds = 1.2,
-     .check = {.kind = FAULTS_FORCE, .bound = 0.02, .begin_s = 0.05}}, /* it begins in touch */
-    SHEET("sheet_0.1mm", 1e-4),
-    SHEET("sheet_0.3mm", 3e-4),
-    SHEET("sheet_1mm", 1e-3),
-    SHEET("sheet_3mm", 3e-3),
-    SHEET("sheet_10mm", 1e-2),
-    SHEET("sheet_20mm", 2e-2),
-    SHEET_THROUGH("sheet_proxy", "proxy"),
-    SHEET_THROUGH("sheet_god", "god-object"),
-    SHEET_THROUGH("sheet_virtual", "virtual"),
-    SHEET_TOOL("sheet_tool", sheet_build, deep_hand, 1e-3),
-    SHEET_TOOL("sheet_tool_3mm", sheet_build, deep_hand, 3e-3),
-    SHEET_TOOL("sheet_tool_20mm", sheet_build, deep_hand, 2e-2),
-    SHEET_TOOL("foil_tool_2", sheet_build, hit_hand_fast, 1e-4),
-    SHEET_TOOL("flying_tool", flying_build, flying_hand, 1e-3),
-    SHEET_HIT("sheet_hit_0.5", 1e-3, hit_hand_slow),
-    SHEET_HIT("sheet_hit_2", 1e-3, hit_hand_fast),
-    SHEET_HIT("foil_hit_2", 1e-4, hit_hand_fast),
-    {.item = 2,
-     .name = "foil_pin_2",
-     .build = sheet_build,
-     .motion = {.hand = hit_hand_fast, .radius = 0.001, .stiffness = 1000.0},
-     .seconds = 0.3,
-     .check = {.kind = FAULTS_HOLD, .bound = 0.02, .reference_hz = 8000.0},
+    /* item, name, world, hand, seconds, judged by */
+    {0, "press", block_build, FINGER(&press_path), 0.5, WITHIN(0.02)},
+    {0, "push", cube_build, FINGER(&push_path), 0.8, WITHIN(0.02)},
+    {1, "disc", disc_build, FINGERTIP(&rim_path), 1.0, WITHIN(0.02)},
+    {1, "disc_tool", disc_build, FINGER(&rim_path, .hand = rim_cube_hand, .cube_tool = true), 1.0,
+     WITHIN(0.02)},
+    {1, "top", top_build, FINGER(&top_path), 0.8, WITHIN(0.03, .reference_hz = 128000.0)},
+    {1, "corner", post_build, FINGER(NULL, .hand = corner_hand), 1.2,
+     WITHIN(0.02, .begin_s = 0.05)}, /* it begins in touch */
+    {2, "sheet_0.1mm", sheet_build, FINGERTIP(&deep_path), 0.8, HELD, .size = 1e-4},
+    {2, "sheet_0.3mm", sheet_build, FINGERTIP(&deep_path), 0.8, HELD, .size = 3e-4},
+    {2, "sheet_1mm", sheet_build, FINGERTIP(&deep_path), 0.8, HELD, .size = 1e-3},
+    {2, "sheet_3mm", sheet_build, FINGERTIP(&deep_path), 0.8, HELD, .size = 3e-3},
+    {2, "sheet_10mm", sheet_build, FINGERTIP(&deep_path), 0.8, HELD, .size = 1e-2},
+    {2, "sheet_20mm", sheet_build, FINGERTIP(&deep_path), 0.8, HELD, .size = 2e-2},
+    {2, "sheet_proxy", sheet_build, FINGERTIP(&deep_path, .through = "proxy"), 0.8, HELD,
+     .size = 0.001},
+    {2, "sheet_god", sheet_build, FINGERTIP(&deep_path, .through = "god-object"), 0.8, HELD,
+     .size = 0.001},
+    {2, "sheet_virtual", sheet_build, FINGERTIP(&deep_path, .through = "virtual"), 0.8, HELD,
+     .size = 0.001},
+    {2, "sheet_tool", sheet_build, FINGERTIP(&deep_path, .cube_tool = true), 0.8, HELD,
+     .size = 1e-3},
+    {2, "sheet_tool_3mm", sheet_build, FINGERTIP(&deep_path, .cube_tool = true), 0.8, HELD,
+     .size = 3e-3},
+    {2, "sheet_tool_20mm", sheet_build, FINGERTIP(&deep_path, .cube_tool = true), 0.8, HELD,
+     .size = 2e-2},
+    {2, "foil_tool_2", sheet_build, FINGERTIP(NULL, .hand = hit_hand_fast, .cube_tool = true), 0.8,
+     HELD, .size = 1e-4},
+    {2, "flying_tool", flying_build, FINGERTIP(&deep_path, .hand = flying_hand, .cube_tool = true),
+     0.8, HELD, .size = 1e-3},
+    {2, "sheet_hit_0.5", sheet_build, FINGERTIP(NULL, .hand = hit_hand_slow), 0.3, HELD,
+     .size = 1e-3},
+    {2, "sheet_hit_2", sheet_build, FINGERTIP(NULL, .hand = hit_hand_fast), 0.3, HELD,
+     .size = 1e-3},
+    {2, "foil_hit_2", sheet_build, FINGERTIP(NULL, .hand = hit_hand_fast), 0.3, HELD, .size = 1e-4},
+    {2,
+     "foil_pin_2",
+     sheet_build,
+     {.path = NULL, .hand = hit_hand_fast, .radius = 0.001, .stiffness = 1000.0},
+     0.3,
+     JUDGED(FAULTS_HOLD, 0.02, .reference_hz = 8000.0),
      .size = 1e-4},
-    {.item = 2,
-     .name = "coin_1mm",
-     .build = coin_build,
-     .motion = FINGERTIP(deep_hand),
-     .seconds = 0.8,
-     .check = HELD,
+    {2, "coin_1mm", coin_build, FINGERTIP(&deep_path), 0.8, HELD, .size = 0.001},
+    {2, "sheet_mesh", sheet_mesh_build, FINGERTIP(&deep_path), 0.8, HELD, .size = 0.001},
+    {2, "sheet_single", sheet_build, FINGERTIP(&deep_path), 0.8,
+     JUDGED(FAULTS_HOLD, 0.02, .model = "single"), .size = 0.001},
+    {2, "sheet_impulse", sheet_build, FINGERTIP(&deep_path), 0.8,
+     JUDGED(FAULTS_HOLD, 0.02, .model = "impulse"), .size = 0.001},
+    {2, "sheet_accel", sheet_build, FINGERTIP(&deep_path), 0.8,
+     JUDGED(FAULTS_HOLD, 0.02, .model = "accelerance"), .size = 0.001},
+    {2, "sheet_flying", flying_build, FINGERTIP(&deep_path, .hand = flying_hand), 0.8, HELD,
      .size = 0.001},
-    {.item = 2,
-     .name = "sheet_mesh",
-     .build = sheet_mesh_build,
-     .motion = FINGERTIP(deep_hand),
-     .seconds = 0.8,
-     .check = HELD,
-     .size = 0.001},
-    SHEET_MODEL("sheet_single", "single"),
-    SHEET_MODEL("sheet_impulse", "impulse"),
-    SHEET_MODEL("sheet_accel", "accelerance"),
-    {.item = 2,
-     .name = "sheet_flying",
-     .build = flying_build,
-     .motion = FINGERTIP(flying_hand),
-     .seconds = 0.8,
-     .check = HELD,
-     .size = 0.001},
-    {.item = 2,
-     .name = "sheet_edge",
-     .build = sheet_build,
-     .motion = FINGERTIP(edge_hand),
-     .seconds = 0.9,
-     .check = WITHIN(0.1),
-     .size = 0.001},
-    {.item = 3,
-     .name = "seam",
-     .build = seam_build,
-     .motion = FINGER(seam_hand),
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 3,
-     .name = "seam_body",
-     .build = seam_body_build,
-     .motion = FINGER(seam_hand),
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 3,
-     .name = "seam_pair",
-     .build = seam_pair_build,
-     .motion = FINGER(seam_hand),
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 3,
-     .name = "seam_rub",
-     .build = seam_build,
-     .motion = {.hand = seam_hand, .radius = 0.01, .stiffness = 1000.0, .friction = 0.5},
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 3,
-     .name = "seam_tool",
-     .build = seam_build,
-     .motion = {.hand = seam_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 3,
-     .name = "seam_tool_rub",
-     .build = seam_build,
-     .motion = {.hand = seam_hand,
-                .radius = 0.01,
-                .stiffness = 1000.0,
-                .friction = 0.5,
-                .cube_tool = true},
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 3,
-     .name = "seam_tool_body",
-     .build = seam_body_build,
-     .motion = {.hand = seam_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 3,
-     .name = "seam_tool_pair",
-     .build = seam_pair_build,
-     .motion = {.hand = seam_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
-     .seconds = 1.0,
-     .check = WITHIN(0.02)},
-    {.item = 3,
-     .name = "nook_tool",
-     .build = nook_build,
-     .motion = {.hand = nook_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
-     .seconds = 0.7,
-     .check = WITHIN(0.02)},
-    {.item = 3,
-     .name = "nook",
-     .build = nook_build,
-     .motion = FINGER(nook_hand),
-     .seconds = 0.7,
-     .check = WITHIN(0.02)},
-    {.item = 4,
-     .name = "field_flat",
-     .build = field_flat_build,
-     .motion = FINGER(field_hand),
-     .seconds = 1.2,
-     .check = WITHIN(0.02)},
-    {.item = 4,
-     .name = "field_tool",
-     .build = field_flat_build,
-     .motion = {.hand = field_hand, .radius = 0.01, .stiffness = 1000.0, .cube_tool = true},
-     .seconds = 1.2,
-     .check = WITHIN(0.02)},
-    {.item = 4,
-     .name = "field_ridges",
-     .build = field_ridges_build,
-     .motion = FINGER(ridge_hand),
-     .seconds = 2.0,
-     .check = WITHIN(0.02)},
-    {.item = 4,
-     .name = "mesh_ridges",
-     .build = mesh_ridges_build,
-     .motion = FINGER(ridge_hand),
-     .seconds = 2.0,
-     .check = WITHIN(0.02)},
-    {.item = 5,
-     .name = "field_crate",
-     .build = crate_on_field_build,
-     .motion = FINGER(crate_hand),
-     .seconds = 0.8,
-     .check = WITHIN(0.02)},
-    {.item = 5,
-     .name = "field_slope",
-     .build = crate_on_slope_build,
-     .motion = FINGER(slope_hand),
-     .seconds = 0.8,
-     .check = WITHIN(0.02)},
-    {.item = 5,
-     .name = "field_ball",
-     .build = ball_on_field_build,
-     .motion = FINGER(crate_hand),
-     .seconds = 0.8,
-     .check = WITHIN(0.02)},
-    {.item = 5,
-     .name = "mesh_plane",
-     .build = mesh_on_plane_build,
-     .motion = FINGER(crate_hand),
-     .seconds = 0.8,
-     .check = WITHIN(0.02)},
-    {.item = 5,
-     .name = "mesh_table",
-     .build = mesh_on_box_build,
-     .motion = FINGER(crate_hand),
-     .seconds = 0.8,
-     .check = WITHIN(0.02)},
-    {.item = 5,
-     .name = "mesh_box",
-     .build = mesh_and_box_build,
-     .motion = FINGER(crate_hand),
-     .seconds = 0.8,
-     .check = WITHIN(0.02)},
-    {.item = 7,
-     .name = "own_contacts",
-     .build = own_build,
-     .motion = FINGER(own_hand),
-     .seconds = 0.8,
-     .check = WITHIN(0.05),
-     .before = own_before,
+    {2, "sheet_edge", sheet_build, FINGERTIP(&edge_path), 0.9, WITHIN(0.1), .size = 0.001},
+    {3, "seam", seam_build, FINGER(&seam_path), 1.0, WITHIN(0.02)},
+    {3, "seam_body", seam_body_build, FINGER(&seam_path), 1.0, WITHIN(0.02)},
+    {3, "seam_pair", seam_pair_build, FINGER(&seam_path), 1.0, WITHIN(0.02)},
+    {3, "seam_rub", seam_build, FINGER(&seam_path, .friction = 0.5), 1.0, WITHIN(0.02)},
+    {3, "seam_tool", seam_build, FINGER(&seam_path, .cube_tool = true), 1.0, WITHIN(0.02)},
+    {3, "seam_tool_rub", seam_build, FINGER(&seam_path, .friction = 0.5, .cube_tool = true), 1.0,
+     WITHIN(0.02)},
+    {3, "seam_tool_body", seam_body_build, FINGER(&seam_path, .cube_tool = true), 1.0,
+     WITHIN(0.02)},
+    {3, "seam_tool_pair", seam_pair_build, FINGER(&seam_path, .cube_tool = true), 1.0,
+     WITHIN(0.02)},
+    {3, "nook_tool", nook_build, FINGER(&nook_path, .cube_tool = true), 0.7, WITHIN(0.02)},
+    {3, "nook", nook_build, FINGER(&nook_path), 0.7, WITHIN(0.02)},
+    {4, "field_flat", field_flat_build, FINGER(&field_path), 1.2, WITHIN(0.02)},
+    {4, "field_tool", field_flat_build, FINGER(&field_path, .cube_tool = true), 1.2, WITHIN(0.02)},
+    {4, "field_ridges", field_ridges_build, FINGER(&ridge_path), 2.0, WITHIN(0.02)},
+    {4, "mesh_ridges", mesh_ridges_build, FINGER(&ridge_path), 2.0, WITHIN(0.02)},
+    {5, "field_crate", crate_on_field_build, FINGER(&crate_path), 0.8, WITHIN(0.02)},
+    {5, "field_slope", crate_on_slope_build, FINGER(&slope_path), 0.8, WITHIN(0.02)},
+    {5, "field_ball", ball_on_field_build, FINGER(&crate_path), 0.8, WITHIN(0.02)},
+    {5, "mesh_plane", mesh_on_plane_build, FINGER(&crate_path), 0.8, WITHIN(0.02)},
+    {5, "mesh_table", mesh_on_box_build, FINGER(&crate_path), 0.8, WITHIN(0.02)},
+    {5, "mesh_box", mesh_and_box_build, FINGER(&crate_path), 0.8, WITHIN(0.02)},
+    {7, "own_contacts", own_build, FINGER(&own_path), 0.8, WITHIN(0.05), .before = own_before,
      .has_own_contacts = true},
-    {.item = 9,
-     .name = "lift_pose",
-     .build = lift_posed_build,
-     .motion = FINGER(lift_hand_linear),
-     .seconds = 0.8,
-     .check = {.kind = FAULTS_STEPS, .bound = 0.01, .bound_20 = 0.03, .begin_s = 0.2},
-     .before = lift_pose_linear},
-    {.item = 9,
-     .name = "swing_pose",
-     .build = lift_posed_build,
-     .motion = FINGER(lift_hand_swing),
-     .seconds = 1.2,
-     .check = {.kind = FAULTS_STEPS, .bound = 0.01, .bound_20 = 0.03, .begin_s = 0.2},
-     .before = lift_pose_swing},
-    {.item = 9,
-     .name = "lift_geom",
-     .build = lift_geom_build,
-     .motion = FINGER(lift_hand_linear),
-     .seconds = 0.8,
-     .check = {.kind = FAULTS_STEPS, .bound = 0.01, .bound_20 = 0.03, .begin_s = 0.2},
-     .before = lift_geom_linear},
-    {.item = 9,
-     .name = "swing_geom",
-     .build = lift_geom_build,
-     .motion = FINGER(lift_hand_swing),
-     .seconds = 1.2,
-     .check = {.kind = FAULTS_STEPS, .bound = 0.01, .bound_20 = 0.03, .begin_s = 0.2},
-     .before = lift_geom_swing},
-    {.item = 9,
-     .name = "lift_twist",
-     .build = lift_linear_build,
-     .motion = FINGER(lift_hand_linear),
-     .seconds = 0.8,
-     .check = {.kind = FAULTS_STEPS, .bound = 0.01, .begin_s = 0.2}},
-    {.item = 9,
-     .name = "swing_twist",
-     .build = lift_posed_build,
-     .motion = FINGER(lift_hand_swing),
-     .seconds = 1.2,
-     .check = {.kind = FAULTS_STEPS, .bound = 0.01, .begin_s = 0.2},
-     .before = lift_twist_swing},
-    {.item = 9,
-     .name = "swing_ahead",
-     .build = lift_posed_build,
-     .motion = FINGER(lift_hand_swing),
-     .seconds = 1.2,
-     .check = {.kind = FAULTS_STEPS, .bound = 0.01, .begin_s = 0.2},
-     .before = lift_twist_swing,
+    {9, "lift_pose", lift_posed_build, FINGER(&lift_path, .hand = lift_hand_linear), 0.8,
+     JUDGED(FAULTS_STEPS, 0.01, .bound_20 = 0.03, .begin_s = 0.2), .before = lift_pose_linear},
+    {9, "swing_pose", lift_posed_build, FINGER(&lift_path, .hand = lift_hand_swing), 1.2,
+     JUDGED(FAULTS_STEPS, 0.01, .bound_20 = 0.03, .begin_s = 0.2), .before = lift_pose_swing},
+    {9, "lift_geom", lift_geom_build, FINGER(&lift_path, .hand = lift_hand_linear), 0.8,
+     JUDGED(FAULTS_STEPS, 0.01, .bound_20 = 0.03, .begin_s = 0.2), .before = lift_geom_linear},
+    {9, "swing_geom", lift_geom_build, FINGER(&lift_path, .hand = lift_hand_swing), 1.2,
+     JUDGED(FAULTS_STEPS, 0.01, .bound_20 = 0.03, .begin_s = 0.2), .before = lift_geom_swing},
+    {9, "lift_twist", lift_linear_build, FINGER(&lift_path, .hand = lift_hand_linear), 0.8,
+     JUDGED(FAULTS_STEPS, 0.01, .begin_s = 0.2)},
+    {9, "swing_twist", lift_posed_build, FINGER(&lift_path, .hand = lift_hand_swing), 1.2,
+     JUDGED(FAULTS_STEPS, 0.01, .begin_s = 0.2), .before = lift_twist_swing},
+    {9, "swing_ahead", lift_posed_build, FINGER(&lift_path, .hand = lift_hand_swing), 1.2,
+     JUDGED(FAULTS_STEPS, 0.01, .begin_s = 0.2), .before = lift_twist_swing,
      .after = lift_twist_next},
-    {.item = 10,
-     .name = "told_fixed",
-     .build = feedback_fixed_build,
-     .motion = FINGER(feedback_hand),
-     .seconds = 0.8,
-     .check = {.kind = FAULTS_FEEDBACK, .bound = 0.02, .begin_s = 0.5},
-     .after = feedback_read},
-    {.item = 10,
-     .name = "told_ball",
-     .build = feedback_ball_build,
-     .motion = FINGER(feedback_hand),
-     .seconds = 0.8,
-     .check = {.kind = FAULTS_FEEDBACK, .bound = 0.02, .begin_s = 0.5},
-     .after = feedback_read},
-    {.item = 10,
-     .name = "told_hinge",
-     .build = feedback_hinge_build,
-     .motion = FINGER(feedback_hand),
-     .seconds = 0.8,
-     .check = {.kind = FAULTS_FEEDBACK, .bound = 0.02, .begin_s = 0.5},
-     .after = feedback_read},
+    {10, "told_fixed", feedback_fixed_build, FINGER(&feedback_path), 0.8,
+     JUDGED(FAULTS_FEEDBACK, 0.02, .begin_s = 0.5), .after = feedback_read},
+    {10, "told_ball", feedback_ball_build, FINGER(&feedback_path), 0.8,
+     JUDGED(FAULTS_FEEDBACK, 0.02, .begin_s = 0.5), .after = feedback_read},
+    {10, "told_hinge", feedback_hinge_build, FINGER(&feedback_path), 0.8,
+     JUDGED(FAULTS_FEEDBACK, 0.02, .begin_s = 0.5), .after = feedback_read},
 };
 
 const size_t faults_table_count = sizeof faults_table / sizeof faults_table[0];

@@ -53,11 +53,7 @@ static void row_build(faults_world *w)
 }
 
 /* Against the middle of the edge x = 0. */
-static void carpet_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.011, 0.0, 0.5 * TILE);
-  faults_glide(t, 0.05, 0.45, 0.011, &x[0], &v[0]);
-}
+static const faults_path carpet_path = {{-0.011, 0.0, 0.5 * TILE}, {{X, 0.05, 0.45, 0.011}}};
 
 #define PILE_EDGE 0.05
 #define PILE_MASS 0.2
@@ -92,11 +88,7 @@ static void pile_build(faults_world *w)
   }
 }
 
-static void pile_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.015, 0.0, 0.025);
-  faults_glide(t, 0.05, 0.45, 0.013, &x[0], &v[0]);
-}
+static const faults_path pile_path = {{-0.015, 0.0, 0.025}, {{X, 0.05, 0.45, 0.013}}};
 
 /* ---- one pointer on many ---- */
 
@@ -123,87 +115,31 @@ static void pebbles_build(faults_world *w)
   }
 }
 
-static void plate_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, 0.0, 0.0, PLATE_RADIUS + PEBBLE + 5e-4);
-  faults_glide(t, 0.05, 0.25, -3e-3, &x[2], &v[2]);
-}
+static const faults_path plate_path = {{0.0, 0.0, PLATE_RADIUS + PEBBLE + 5e-4},
+                                       {{Z, 0.05, 0.25, -3e-3}}};
 
-#define PLATE                                                                         \
-  {                                                                                   \
-    .hand = plate_hand, .radius = PLATE_RADIUS, .stiffness = 20.0, .max_force = 200.0 \
+#define PLATE                                                                          \
+  {                                                                                    \
+    .path = &plate_path, .radius = PLATE_RADIUS, .stiffness = 20.0, .max_force = 200.0 \
   }
-#define PILE_FINGER                                                        \
-  {                                                                        \
-    .hand = pile_hand, .radius = 0.01, .stiffness = 2000.0, .damping = 5.0 \
+#define PILE_FINGER                                                         \
+  {                                                                         \
+    .path = &pile_path, .radius = 0.01, .stiffness = 2000.0, .damping = 5.0 \
   }
-#define LIGHT                                                \
-  {                                                          \
-    .hand = carpet_hand, .radius = 0.01, .stiffness = 1000.0 \
-  }
-
 static const faults_scene many_table[] = {
-    {.item = 13,
-     .name = "pile_100",
-     .build = pile_build,
-     .motion = PILE_FINGER,
-     .seconds = 1.0,
-     .check = {.kind = FAULTS_DUTY, .bound = 0.15, .bound_20 = 0.15},
+    /* item, name, world, hand, seconds, judged by */
+    {13, "pile_100", pile_build, PILE_FINGER, 1.0, JUDGED(FAULTS_DUTY, 0.15, .bound_20 = 0.15),
      .count = 100},
-    {.item = 13,
-     .name = "pile_300",
-     .build = pile_build,
-     .motion = PILE_FINGER,
-     .seconds = 1.0,
-     .check = {.kind = FAULTS_DUTY, .bound = 1e9, .bound_20 = 1.0},
+    {13, "pile_300", pile_build, PILE_FINGER, 1.0, JUDGED(FAULTS_DUTY, 1e9, .bound_20 = 1.0),
      .count = 300},
-    {.item = 13,
-     .name = "pile_1000",
-     .build = pile_build,
-     .motion = PILE_FINGER,
-     .seconds = 1.0,
-     .check = {.kind = FAULTS_DUTY_OWN, .bound = 1e9, .bound_20 = 0.1},
+    {13, "pile_1000", pile_build, PILE_FINGER, 1.0, JUDGED(FAULTS_DUTY_OWN, 1e9, .bound_20 = 0.1),
      .count = 1000},
-    {.item = 14,
-     .name = "carpet",
-     .build = carpet_build,
-     .motion = LIGHT,
-     .seconds = 0.5,
-     .check = {.kind = FAULTS_FORCE, .bound = 0.03, .iterations = 100}},
-    {.item = 14,
-     .name = "pile_30",
-     .build = pile_build,
-     .motion = PILE_FINGER,
-     .seconds = 0.5,
-     .check = {.kind = FAULTS_FORCE, .bound = 0.03, .iterations = 200},
-     .count = 30},
-    {.item = 14,
-     .name = "light_row",
-     .build = row_build,
-     .motion = LIGHT,
-     .seconds = 0.5,
-     .check = {.kind = FAULTS_FORCE, .bound = 0.01, .iterations = 200}},
-    {.item = 15,
-     .name = "plate_64",
-     .build = pebbles_build,
-     .motion = PLATE,
-     .seconds = 0.4,
-     .check = {.kind = FAULTS_CAPACITY, .bound = 0.05},
-     .count = 64},
-    {.item = 15,
-     .name = "plate_256",
-     .build = pebbles_build,
-     .motion = PLATE,
-     .seconds = 0.4,
-     .check = {.kind = FAULTS_CAPACITY, .bound = 0.05},
-     .count = 256},
-    {.item = 15,
-     .name = "plate_1000",
-     .build = pebbles_build,
-     .motion = PLATE,
-     .seconds = 0.4,
-     .check = {.kind = FAULTS_CAPACITY, .bound = 0.05},
-     .count = 1000},
+    {14, "carpet", carpet_build, FINGER(&carpet_path), 0.5, WITHIN(0.03, .iterations = 100)},
+    {14, "pile_30", pile_build, PILE_FINGER, 0.5, WITHIN(0.03, .iterations = 200), .count = 30},
+    {14, "light_row", row_build, FINGER(&carpet_path), 0.5, WITHIN(0.01, .iterations = 200)},
+    {15, "plate_64", pebbles_build, PLATE, 0.4, JUDGED(FAULTS_CAPACITY, 0.05), .count = 64},
+    {15, "plate_256", pebbles_build, PLATE, 0.4, JUDGED(FAULTS_CAPACITY, 0.05), .count = 256},
+    {15, "plate_1000", pebbles_build, PLATE, 0.4, JUDGED(FAULTS_CAPACITY, 0.05), .count = 1000},
 };
 
 const faults_scene *faults_scene_at(size_t index)

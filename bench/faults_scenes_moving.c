@@ -41,12 +41,8 @@ static void chain_build(faults_world *w)
 }
 
 /* Pushes the sixth link aside, and goes away fast. */
-static void chain_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, -0.017, 0.0, -5.5 * LINK_PITCH);
-  faults_glide(t, 0.05, 0.55, 0.08, &x[0], &v[0]);
-  faults_glide(t, 0.6, 0.8, -0.22, &x[0], &v[0]);
-}
+static const faults_path chain_path = {{-0.017, 0.0, -5.5 * LINK_PITCH},
+                                       {{X, 0.05, 0.55, 0.08}, {X, 0.6, 0.8, -0.22}}};
 
 #define PLANKS 12
 #define PLANK_PITCH 0.042
@@ -81,11 +77,7 @@ static void bridge_build(faults_world *w)
 }
 
 /* Comes from far above and presses on the middle, as the bridge has nearly come to rest. */
-static void bridge_hand(double t, double x[3], double v[3])
-{
-  faults_hand_at(x, v, 0.0, 0.0, 0.2);
-  faults_glide(t, 0.6, 1.2, -0.26, &x[2], &v[2]);
-}
+static const faults_path bridge_path = {{0.0, 0.0, 0.2}, {{Z, 0.6, 1.2, -0.26}}};
 
 /* ---- bodies that arrive ---- */
 
@@ -100,11 +92,7 @@ static void fall_build(faults_world *w)
   dGeomSetBody(dCreateSphere(w->space, 0.02), ball);
 }
 
-static void still_hand(double t, double x[3], double v[3])
-{
-  (void)t;
-  faults_hand_at(x, v, 0.0, 0.0, 0.0);
-}
+static const faults_path still_path = {{0.0, 0.0, 0.0}};
 
 static void fly_build(faults_world *w)
 {
@@ -131,11 +119,7 @@ static void belt_build(faults_world *w)
   dBodySetLinearVel(belt, BELT_SPEED, 0.0, 0.0);
 }
 
-static void belt_hand(double t, double x[3], double v[3])
-{
-  (void)t;
-  faults_hand_at(x, v, 0.0, 0.0, 0.03);
-}
+static const faults_path belt_path = {{0.0, 0.0, 0.03}};
 
 /* A bar of 150 mm on a motor, which turns it against the hand. */
 static void arm_build(faults_world *w)
@@ -154,11 +138,7 @@ static void arm_build(faults_world *w)
   dJointSetHingeParam(axle, dParamFMax, 0.3);
 }
 
-static void arm_hand(double t, double x[3], double v[3])
-{
-  (void)t;
-  faults_hand_at(x, v, 0.12, 0.021, 0.0);
-}
+static const faults_path arm_path = {{0.12, 0.021, 0.0}};
 
 /* ---- slow motion ---- */
 
@@ -168,11 +148,7 @@ static void slow_wall_build(faults_world *w)
 }
 
 /* 5 N from the begin. */
-static void slow_wall_hand(double t, double x[3], double v[3])
-{
-  (void)t;
-  faults_hand_at(x, v, 0.0, 0.0, 0.005);
-}
+static const faults_path slow_wall_path = {{0.0, 0.0, 0.005}};
 
 /* Beside the hand, which does not touch it. */
 static void slow_fall_build(faults_world *w)
@@ -189,18 +165,6 @@ static void height_read(faults_world *w, double begin, double end)
   w->told = dBodyGetPosition(w->bodies[0])[2];
 }
 
-#define FINGER(h)                                    \
-  {                                                  \
-    .hand = (h), .radius = 0.01, .stiffness = 1000.0 \
-  }
-#define FINGER_DAMPED(h, d)                                          \
-  {                                                                  \
-    .hand = (h), .radius = 0.01, .stiffness = 1000.0, .damping = (d) \
-  }
-#define WITHIN(b)                      \
-  {                                    \
-    .kind = FAULTS_FORCE, .bound = (b) \
-  }
 #define DRIVEN                                                   \
   {                                                              \
     .kind = FAULTS_FORCE, .bound = 0.05, .reference_hz = 16000.0 \
@@ -211,57 +175,17 @@ static void height_read(faults_world *w, double begin, double end)
   }
 
 const faults_scene faults_moving_table[] = {
-    {.item = 11,
-     .name = "slow_wall",
-     .build = slow_wall_build,
-     .motion = FINGER(slow_wall_hand),
-     .seconds = 1.0,
-     .check = {.kind = FAULTS_FORCE, .bound = 0.02, .begin_s = 0.1},
+    /* item, name, world, hand, seconds, judged by */
+    {11, "slow_wall", slow_wall_build, FINGER(&slow_wall_path), 1.0, WITHIN(0.02, .begin_s = 0.1),
      .slow = 0.1},
-    {.item = 11,
-     .name = "slow_fall",
-     .build = slow_fall_build,
-     .motion = FINGER(still_hand),
-     .seconds = 1.0,
-     .check = {.kind = FAULTS_FEEDBACK, .bound = 0.05, .begin_s = 0.1},
-     .after = height_read,
-     .slow = 0.1},
-    {.item = 12,
-     .name = "chain_let_go",
-     .build = chain_build,
-     .motion = FINGER(chain_hand),
-     .seconds = 2.0,
-     .check = WITHIN(0.02)},
-    {.item = 12,
-     .name = "bridge",
-     .build = bridge_build,
-     .motion = FINGER(bridge_hand),
-     .seconds = 1.6,
-     .check = WITHIN(0.02)},
-    {.item = 12,
-     .name = "fall",
-     .build = fall_build,
-     .motion = FINGER(still_hand),
-     .seconds = 0.4,
-     .check = ARRIVES},
-    {.item = 12,
-     .name = "fly",
-     .build = fly_build,
-     .motion = FINGER(still_hand),
-     .seconds = 0.5,
-     .check = ARRIVES},
-    {.item = 12,
-     .name = "belt",
-     .build = belt_build,
-     .motion = FINGER_DAMPED(belt_hand, 10.0),
-     .seconds = 1.2,
-     .check = DRIVEN},
-    {.item = 12,
-     .name = "motor_arm",
-     .build = arm_build,
-     .motion = FINGER_DAMPED(arm_hand, 5.0),
-     .seconds = 1.0,
-     .check = DRIVEN},
+    {11, "slow_fall", slow_fall_build, FINGER(&still_path), 1.0,
+     JUDGED(FAULTS_FEEDBACK, 0.05, .begin_s = 0.1), .after = height_read, .slow = 0.1},
+    {12, "chain_let_go", chain_build, FINGER(&chain_path), 2.0, WITHIN(0.02)},
+    {12, "bridge", bridge_build, FINGER(&bridge_path), 1.6, WITHIN(0.02)},
+    {12, "fall", fall_build, FINGER(&still_path), 0.4, ARRIVES},
+    {12, "fly", fly_build, FINGER(&still_path), 0.5, ARRIVES},
+    {12, "belt", belt_build, FINGER(&belt_path, .damping = 10.0), 1.2, DRIVEN},
+    {12, "motor_arm", arm_build, FINGER(&arm_path, .damping = 5.0), 1.0, DRIVEN},
 };
 
 const size_t faults_moving_count = sizeof faults_moving_table / sizeof faults_moving_table[0];

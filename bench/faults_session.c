@@ -134,7 +134,7 @@ static hap_status ticks_run(bench *b, hap_session *session, hap_pointer_id hand,
     hap_pose pose = {.quat_wxyz = {1.0}};
     hap_twist twist = {{0.0}, {0.0}};
     hap_pointer_state state;
-    run->w.scene->motion.hand((double)i * FAULTS_TICK_S, pose.position, twist.linear);
+    faults_hand(&run->w.scene->motion, (double)i * FAULTS_TICK_S, pose.position, twist.linear);
     hap_status status = hap_pointer_set_target(session, hand, &pose, &twist);
     if (status >= HAP_OK && i == 0) {
       status = hap_session_start(session);
@@ -172,7 +172,7 @@ static hap_status frames_run(bench *b, hap_session *session, hap_pointer_id hand
     hap_pose drawn;
     hap_pointer_state state;
     double t = (double)i * FAULTS_TICK_S;
-    scene->motion.hand(t, pose.position, twist.linear);
+    faults_hand(&scene->motion, t, pose.position, twist.linear);
     hap_status status = hap_pointer_set_target(session, hand, &pose, &twist);
     if (status >= HAP_OK && i == 0) {
       status = hap_session_set_time_scale(session, scene->slow);

@@ -36,20 +36,29 @@ dGeomID faults_box(faults_world *w, dBodyID body, const double size[3], const do
   return box;
 }
 
-void faults_hand_at(double out_position[3], double out_velocity[3], double x, double y, double z)
+/* A way with soft ends. */
+static void hand_glide(const faults_glide *g, double t, double *io_position, double *io_velocity)
 {
-  out_position[0] = x;
-  out_position[1] = y;
-  out_position[2] = z;
-  memset(out_velocity, 0, 3 * sizeof *out_velocity);
+  double u = fmin(fmax((t - g->begin) / (g->end - g->begin), 0.0), 1.0);
+  *io_position += g->way * u * u * u * (10.0 + u * (6.0 * u - 15.0));
+  *io_velocity += g->way * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (g->end - g->begin);
 }
 
-void faults_glide(double t, double begin, double end, double way, double *io_position,
-                  double *io_velocity)
+void faults_hand(const faults_motion *motion, double t, double out_position[3],
+                 double out_velocity[3])
 {
-  double u = fmin(fmax((t - begin) / (end - begin), 0.0), 1.0);
-  *io_position += way * u * u * u * (10.0 + u * (6.0 * u - 15.0));
-  *io_velocity += way * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end - begin);
+  const faults_path *path = motion->path;
+  for (int k = 0; k < 3; ++k) {
+    out_position[k] = path != NULL ? path->from[k] : 0.0;
+    out_velocity[k] = 0.0;
+  }
+  for (int i = 0; path != NULL && i < FAULTS_GLIDES && path->glides[i].way != 0.0; ++i) {
+    const faults_glide *glide = &path->glides[i];
+    hand_glide(glide, t, &out_position[glide->axis], &out_velocity[glide->axis]);
+  }
+  if (motion->hand != NULL) {
+    motion->hand(t, out_position, out_velocity);
+  }
 }
 
 double faults_world_open(const faults_world *w)

@@ -160,8 +160,10 @@ static inline dGeomID grid_mesh(dSpaceID space, grid *g)
   int row = g->cells + 1;
   dTriIndex *at = g->indices;
   for (int n = 0; n < row * row; ++n) {
-    g->corners[3 * n] = g->cell * (n % row - 0.5 * g->cells);
-    g->corners[3 * n + 1] = g->cell * (0.5 * g->cells - n / row);
+    int i = n % row;
+    int k = n / row;
+    g->corners[3 * n] = g->cell * (i - 0.5 * g->cells);
+    g->corners[3 * n + 1] = g->cell * (0.5 * g->cells - k);
     g->corners[3 * n + 2] = g->heights[n];
   }
   for (int n = 0; n < g->cells * g->cells; ++n) {

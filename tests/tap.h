@@ -59,7 +59,7 @@ bool tap_bail_out(const char *reason);
 /* Zeroed memory of the running test. It is finished and freed when the test has ended, the newest
  * first; tap_release does that at once. */
 void *tap_own(size_t size, void (*finish)(void *owned));
-void tap_release(void *owned);
+void tap_release(void *memory);
 /* Functions that are called after the last test, the newest first. */
 void tap_at_end(void (*function)(void));
 void tap_run(void (*test)(void), const char *name);
@@ -78,14 +78,15 @@ static inline void tap_check(bool good, const char *file, int line, const char *
 #define TEST(name)        \
   void test_##name(void); \
   void test_##name(void)
-#define TEST_EACH(table, row)                                                              \
-  static void each_##table(row);                                                           \
-  extern const tap_table rows_##table;                                                     \
-  const tap_table rows_##table = {table, sizeof table[0], sizeof table / sizeof table[0]}; \
-  TEST(table)                                                                              \
-  {                                                                                        \
-    each_##table(tap_row);                                                                 \
-  }                                                                                        \
+#define TEST_EACH(table, row)                                          \
+  static void each_##table(row);                                       \
+  extern const tap_table rows_##table;                                 \
+  const tap_table rows_##table = {(table), sizeof((table)[0]),         \
+                                  sizeof(table) / sizeof((table)[0])}; \
+  TEST(table)                                                          \
+  {                                                                    \
+    each_##table(tap_row);                                             \
+  }                                                                    \
   static void each_##table(row)
 #define SET_UP           \
   bool tap_set_up(void); \
