@@ -309,6 +309,26 @@ TEST(of_several_cycles_the_newest_is_taken)
   }
 }
 
+/* Else each string would be taken for one of the other board. */
+TEST(boards_that_answer_under_each_others_names_are_refused)
+{
+  int16_t raw[8] = {0};
+  int16_t seen[HAPI_SPIDAR_CYCLE_MOTORS];
+  uint8_t bytes[128];
+  for (int piece = 1; piece <= 34; ++piece) {
+    hapi_spidar_cycle cycle;
+    hapi_spidar_cycle_init(&cycle, &two_b3m);
+    int length = make_replies(&two_b3m, raw, bytes);
+    uint8_t first = bytes[0];
+    bytes[0] = bytes[length / 2];
+    bytes[length / 2] = first;
+    for (int at = 0; at < length; at += piece) {
+      hapi_spidar_cycle_push(&cycle, bytes + at, at + piece < length ? piece : length - at);
+      CHECK(!hapi_spidar_cycle_take(&cycle, seen));
+    }
+  }
+}
+
 TEST(who_is_silent_is_told)
 {
   hapi_spidar_cycle cycle;
