@@ -262,6 +262,42 @@ TEST(a_torque_that_is_not_finite_is_a_fault_too)
   check_v3(p->device.wrench.torque, 0.0, 0.0, 0.0, 0.0);
 }
 
+/* ---- what is reported ---- */
+
+static void torque_guarded(hapi_pointer *p, double z)
+{
+  hapi_v3_set(p->wrench.force, 1.0, 0.0, 0.0);
+  hapi_v3_set(p->wrench.torque, 0.0, 0.0, z);
+  hapi_tick_guard(&f.tick);
+}
+
+TEST(torque_is_reported_where_a_hand_feels_it)
+{
+  hapi_pointer *p = guarded_and_warm();
+  p->device.three_dof = false;
+  p->device.feels_torque = true;
+  torque_guarded(p, 0.1);
+  CHECK_NEAR(p->wrench.torque[2], 0.1, 1e-12);
+  p->device.feels_torque = false;
+  torque_guarded(p, 0.1);
+  CHECK(p->wrench.torque[2] == 0.0 && p->wrench.force[0] == 1.0);
+  p->device.feels_torque = true;
+  p->device.three_dof = true;
+  torque_guarded(p, 0.1);
+  CHECK(p->wrench.torque[2] == 0.0 && p->wrench.force[0] == 1.0);
+}
+
+/* Nothing is felt there, so nothing can be taken back from what was written. */
+TEST(a_fault_is_reported_as_no_force_at_a_force_scale_of_0)
+{
+  hapi_pointer *p = guarded_and_warm();
+  p->device.force_scale = 0.0;
+  guard_wrench(p, 3.0, 0.0, 0.0);
+  CHECK(p->wrench.force[0] == 3.0); /* of the world, as no limit of the device was met */
+  guard_wrench(p, (double)NAN, 0.0, 0.0);
+  CHECK(hapi_v3_norm(p->wrench.force) == 0.0 && hapi_v3_norm(p->device.wrench.force) == 0.0);
+}
+
 TEST(the_first_fault_is_the_one_that_stays)
 {
   hapi_pointer *p = guarded_and_warm();

@@ -498,7 +498,7 @@ TEST(what_is_no_text_is_refused)
   unlink(path);
   CHECK(hapi_spidar_model_read(path, &m, &detail) == HAP_ERROR_IO);
   CHECK(hapi_spidar_model_read("/", &m, &detail) == HAP_ERROR_IO);
-  CHECK(strstr(detail.text, "cannot be read") != NULL);
+  CHECK(strstr(detail.text, "it is a folder") != NULL);
 }
 
 SET_UP
