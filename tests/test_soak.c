@@ -35,6 +35,7 @@ static const char *const trouble_names[TROUBLES] = {"read fails", "write fails",
 static hap_device *devices[DEVICES];
 static hap_pointer_id hands[DEVICES];
 static atomic_int beyond; /* writes that were not finite, or beyond the limit */
+static int own_faults;    /* of a busy machine: a loop that was held up */
 
 /* Watches what arrives at the motors. */
 static void soak_push(fake_device *d, const hap_wrench *wanted, hap_wrench *reached)
@@ -64,8 +65,13 @@ static bool await_force(stage *s, bool wanted)
     for (int i = 0; i < DEVICES; ++i) {
       all = all && hand_pushes(i) == wanted;
     }
-    if (all && is_faulted(s) == !wanted) {
+    bool faulted = is_faulted(s);
+    if (all && faulted == !wanted) {
       return true;
+    }
+    if (faulted && wanted && ms % 100 == 99) {
+      ++own_faults;
+      CHECK(hap_session_reset_fault(s->session) == HAP_OK);
     }
     sleep_ms(1);
   }
@@ -201,7 +207,8 @@ TEST(force_is_gone_after_each_fault_and_nothing_grows)
     sleep_ms((int)(1000.0 * pause_s * ((random >> 8) % 100) / 50.0));
   }
   long grown_kb = memory_kb() - warm_kb;
-  printf("# %d faults in %.0f s, memory %+ld kB of %ld\n", passed, seconds, grown_kb, warm_kb);
+  printf("# %d faults in %.0f s and %d of a busy machine, memory %+ld kB of %ld\n", passed, seconds,
+         own_faults, grown_kb, warm_kb);
   CHECK(passed >= 3 && warm_kb > 0);
   CHECK(entries_of("/proc/self/fd") == files && entries_of("/proc/self/task") == threads);
 #if !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
