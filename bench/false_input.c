@@ -455,11 +455,13 @@ static hap_status run_measure(stage *s, false_input_run *out, hap_detail *detail
       if (stats.faults.fault != HAP_FAULT_NONE && out->fault_s < 0.0) {
         hap_detail why = {""};
         (void)hap_session_detail(s->session, &why);
-        snprintf(out->text, sizeof out->text, "%.250s", why.text);
+        snprintf(out->text, sizeof out->text, "%.590s", why.text);
         out->fault = stats.faults.fault;
         out->fault_s = since;
       }
-      if (since > 0.0 && out->told_s < 0.0 && (state.guard & HAP_GUARD_FAULT) != 0) {
+      out->doubted = out->doubted || (state.guard & HAP_GUARD_INPUT) != 0;
+      if (since > 0.0 && out->told_s < 0.0 &&
+          (state.guard & (HAP_GUARD_FAULT | HAP_GUARD_INPUT)) != 0) {
         out->told_s = since;
       }
     }

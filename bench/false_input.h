@@ -55,7 +55,8 @@ typedef struct false_input_run {
   uint32_t fault;                         /* hap_fault that latched */
   double fault_s;                         /* from FALSE_INPUT_BEGIN_S; < 0: none */
   double told_s;                          /* when a flag of the guard said so first; < 0: never */
-  char text[256];                         /* of the fault */
+  bool doubted;   /* at any time, the guard said that the device is not believed */
+  char text[600]; /* of the fault */
 } false_input_run;
 
 /* Against the run without anything false. */

@@ -148,7 +148,7 @@ static hap_status ask_for_sweep(session *s, bool *out_sweep)
 
 static void range_widen(session *s)
 {
-  const hap_pose *pose = &s->spidar->solver.pose;
+  const hap_pose *pose = &s->spidar->belief.trial.pose;
   for (int k = 0; k < 3; ++k) {
     s->least[k] = fmin(s->least[k], pose->position[k]);
     s->most[k] = fmax(s->most[k], pose->position[k]);

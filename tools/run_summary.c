@@ -47,6 +47,8 @@ static const char *fault_name(hap_fault fault)
       return "device_write";
     case HAP_FAULT_WORLD:
       return "world";
+    case HAP_FAULT_DEVICE_INPUT:
+      return "device_input";
     case HAP_FAULT_EMERGENCY:
       return "emergency";
     case HAP_FAULT_BLOCKED:

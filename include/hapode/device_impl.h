@@ -61,6 +61,11 @@ typedef struct hap_device_ops {
    * a device of dof 3 gives a constant one. Never blocks except with pacing DEVICE, never
    * allocates. HAP_ERROR_STATE before start and after stop.
    *
+   * HAP_STALE: the device does not believe what it measures, and the outputs are its last good
+   * ones, carried on for a few ms. The session goes on with them, takes the force away over 18 ms
+   * and then latches HAP_FAULT_DEVICE_INPUT. Where there is no force yet, it comes in when they are
+   * good.
+   *
    * After an error the outputs are not used, and the session latches a fault and calls zero. A
    * positive number that is no hap_status counts as an error, for write too. The session goes on
    * reading: a device that was unplugged may answer again, and is used again after

@@ -162,7 +162,8 @@ typedef enum hap_guard_flag {
   HAP_GUARD_ENERGY = 4,     /* the energy observer held force back */
   HAP_GUARD_SLEW = 8,       /* the slew limit held force back */
   HAP_GUARD_SATURATED = 16, /* beyond a limit and shortened, direction kept */
-  HAP_GUARD_FAULT = 32      /* a fault is latched: on the way to zero, or there */
+  HAP_GUARD_FAULT = 32,     /* a fault is latched: on the way to zero, or there */
+  HAP_GUARD_INPUT = 256     /* the device is not believed: carried on, then less and less force */
 } hap_guard_flag;
 
 /* A pointer in its last tick. It has a size and may grow at its end. */

@@ -24,7 +24,9 @@ typedef enum hap_fault {
   HAP_FAULT_DEVICE_WRITE = 5, /* the device's write failed */
   HAP_FAULT_WORLD = 6,        /* the ODE world holds a body that cannot be stepped */
   HAP_FAULT_EMERGENCY = 7,    /* hap_emergency_zero was called */
-  HAP_FAULT_BLOCKED = 10      /* the loop stood still, in a call of a device or elsewhere */
+  HAP_FAULT_BLOCKED = 10,     /* the loop stood still, in a call of a device or elsewhere */
+  /* for 18 ms the device told positions that no hand moves to, or said that they are wrong */
+  HAP_FAULT_DEVICE_INPUT = 11
 } hap_fault;
 
 /* [any] What happened and what to do, in one sentence. "" for HAP_FAULT_NONE; never NULL. */

@@ -15,6 +15,19 @@
 #define HAPI_SAFETY_STATE_LIMIT 1e6   /* m, m/s, rad/s */
 #define HAPI_SAFETY_WRENCH_LIMIT 1e12 /* N, N m */
 
+/* ---- a plausible input ---- */
+#define HAPI_SAFETY_ACCELERATION_LIMIT 500.0 /* m/s^2 */
+#define HAPI_SAFETY_SWING_LIMIT 300.0        /* m/s^2 */
+#define HAPI_SAFETY_STALE_SPEED 0.1          /* m/s */
+#define HAPI_SAFETY_CARRY_S 0.004            /* s */
+#define HAPI_SAFETY_CARRY_SPEED 1.0          /* m/s */
+#define HAPI_SAFETY_CARRY_SPIN 10.0          /* rad/s */
+#define HAPI_SAFETY_SPIN_CHANGE 50.0         /* rad/s */
+#define HAPI_SAFETY_CONFIRM_S 0.003          /* s */
+#define HAPI_SAFETY_JUMP_LEAST 0.003         /* m */
+#define HAPI_SAFETY_DOUBT_FADE_S 0.014       /* s */
+#define HAPI_SAFETY_MISFIT_S 0.3             /* s */
+
 /* ---- how fast force comes and goes ---- */
 #define HAPI_SAFETY_SLEW_S 0.002     /* s */
 #define HAPI_SAFETY_RAMP_IN_S 0.02   /* s */

@@ -184,7 +184,7 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     if (p->generation != 0) {
       double scale = p->device.force_scale;
       p->guard.limit = scale > 0.0 ? p->device.limits.max_force / scale : 0.0;
-      p->guard.felt = p->guard.share * (1.0 - guard->age_loss);
+      p->guard.felt = p->guard.share * (1.0 - guard->age_loss) * (1.0 - p->belief.loss);
     }
   }
   for (uint32_t i = 0; i < touches->count; ++i) {

@@ -8,6 +8,7 @@
 #include "base/safety.h"
 #include "base/vec.h"
 #include "pointer/coupling.h"
+#include "pointer/plausible.h"
 
 /* The last thing between the simulation and the motors, in this order: finite, age of the local
  * model, ramp-in, energy observer, slew, saturation. All of it shapes what the hand feels; the
@@ -36,6 +37,7 @@ void hapi_guard_reset_fault(hapi_guard *guard, const hapi_pointers *pointers,
   guard->latch.pointer = guard->latch.generation = 0;
   for (uint32_t i = 0; i < pointers->high; ++i) {
     pointers->of[i].guard.share = 0.0;
+    hapi_input_forgive(&pointers->of[i]);
     pointers->of[i].device.jump_s = 0.0; /* whoever resets knows where the device is */
   }
   hapi_touches_forget(touches, HAPI_SLOT_NONE); /* the hand may be anywhere by now */
@@ -95,10 +97,12 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
   if (guard->mode == HAP_GUARD_MEASURE) {
     return;
   }
-  g->share = hapi_min(g->share + period / HAPI_SAFETY_RAMP_IN_S, 1.0);
-  double share = g->share * (1.0 - guard->age_loss);
+  bool waits = g->share <= 0.0 && p->belief.doubted;
+  g->share = waits ? 0.0 : hapi_min(g->share + period / HAPI_SAFETY_RAMP_IN_S, 1.0);
+  double share = g->share * (1.0 - guard->age_loss) * (1.0 - p->belief.loss);
   g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;
   g->flags |= guard->age_loss > 0.0 ? HAP_GUARD_STALE : 0;
+  g->flags |= p->belief.doubted || p->belief.loss > 0.0 ? HAP_GUARD_INPUT : 0;
   hapi_v3_scale(share, p->device.wrench.force, p->device.wrench.force);
   hapi_v3_scale(share, p->device.wrench.torque, p->device.wrench.torque);
 }
@@ -172,6 +176,9 @@ void hapi_guard_begin(hapi_guard *guard, const hapi_tick_facts *facts,
     const hapi_pointer *p = &pointers->of[i];
     if (p->generation != 0 && !wrench_is_usable(&p->wrench)) {
       hapi_fault_set(&guard->latch, HAP_FAULT_FORCE, i + 1, p->generation);
+    }
+    if (p->generation != 0 && p->belief.loss >= 1.0) {
+      hapi_fault_set(&guard->latch, HAP_FAULT_DEVICE_INPUT, i + 1, p->generation);
     }
   }
   follow_age(guard, facts);

@@ -176,6 +176,7 @@ typedef struct hapi_pointer_input {
   hap_twist twist;
   uint32_t buttons;
   bool failed;
+  bool doubted; /* by the device itself */
 } hapi_pointer_input;
 
 typedef struct hapi_pointer_output {

@@ -13,6 +13,7 @@
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
 #include "pointer/coupling.h"
+#include "pointer/plausible.h"
 
 #define GRIP_MOST 0.05            /* m, at the device: arm that a handle has against turning */
 #define BALL_INERTIA 0.4          /* m r^2 */
@@ -218,8 +219,9 @@ static void ask_device(hapi_haptic *haptic, uint32_t index, int64_t now_ns, hapi
   hapi_pointer_slot *slot = &haptic->slots[index];
   if (slot->ops != NULL) {
     hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_READ, index);
-    io->failed =
-        !hapi_device_did(slot->ops->read(slot->self, now_ns, &io->pose, &io->twist, &io->buttons));
+    hap_status status = slot->ops->read(slot->self, now_ns, &io->pose, &io->twist, &io->buttons);
+    io->failed = !hapi_device_did(status);
+    io->doubted = status == HAP_STALE;
     return;
   }
   hapi_triple_take(&slot->target_buffer);
@@ -250,7 +252,9 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     p->device.pose = in.pose;
     p->device.twist = in.twist;
     p->device.buttons = in.buttons;
-    if (slot->has_device && p->device.estimates) {
+    bool believed =
+        haptic->tick.guard.mode != HAP_GUARD_ON || hapi_input_judge(p, now_ns, in.doubted);
+    if (slot->has_device && p->device.estimates && believed) {
       hapi_velocity_update(&p->velocity, now_ns, &p->device.pose, &p->device.twist);
     }
   }

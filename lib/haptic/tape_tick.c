@@ -209,6 +209,7 @@ void hapi_tape_input(hapi_haptic *haptic, uint32_t index, hapi_pointer_input *io
   hapi_tape *tape = haptic->tape;
   hapi_cell *pose = hapi_tape_next(tape, HAPI_CELL_POSE, index);
   hapi_tape_move_flag(tape, pose, HAPI_CELL_FAILED, &io->failed);
+  hapi_tape_move_flag(tape, pose, HAPI_CELL_DOUBTED, &io->doubted);
   hapi_tape_move(tape, &pose->word, &io->buttons, sizeof io->buttons);
   hapi_tape_move(tape, pose->d, &io->pose, sizeof io->pose);
   hapi_tape_move(tape, hapi_tape_next(tape, HAPI_CELL_TWIST, index)->d, &io->twist,

@@ -22,6 +22,15 @@ static inline void hapi_contact_ramp_begin(hapi_ramp *r, double depth, bool jump
                    .held = deep && jumped};
 }
 
+/* A contact that was there already when the device jumped keeps its force: its surface moves as far
+ * as the device went in. */
+static inline void hapi_contact_ramp_shift(hapi_ramp *r, double depth)
+{
+  double counted = hapi_max(r->depth - r->excess, 0.0);
+  r->excess = hapi_max(hapi_max(depth - counted, hapi_min(r->excess, depth)), 0.0);
+  r->held = r->held || r->excess > 0.0;
+}
+
 /* Share of its force that a contact of the pointer has, and the part of its depth that counts in
  * *io_depth. One that arrives with depth starts at zero; one that closes later has all of it. A
  * pointer that draws back out of an excess depth has it off for good. Once a tick. */
@@ -30,7 +39,9 @@ static inline double hapi_ramp_follow(hapi_ramp *r, bool *io_seen, const hapi_po
 {
   double depth = *io_depth;
   double most = hapi_max(HAPI_SAFETY_CONTACT_PRESS_MOST * period, HAPI_SAFETY_CONTACT_DEPTH);
-  if (!*io_seen || depth - hapi_max(r->depth, 0.0) > most) {
+  if (*io_seen && p->belief.jumped) {
+    hapi_contact_ramp_shift(r, depth);
+  } else if (!*io_seen || depth - hapi_max(r->depth, 0.0) > most) {
     hapi_contact_ramp_begin(r, depth, p->device.jump_s > 0.0);
     *io_seen = true;
   } else if (r->share < 1.0 || r->excess > 0.0) {

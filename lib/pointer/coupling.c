@@ -97,7 +97,7 @@ static bool pointer_jumps(const hapi_pointer *p, double period)
     return false;
   }
   hapi_v3_sub(p->device.pose.position, p->device.good.position, way);
-  return hapi_v3_norm(way) > p->device.speed_limit * period ||
+  return p->belief.jumped || hapi_v3_norm(way) > p->device.speed_limit * period ||
          (p->shape.hull != NULL && !p->device.three_dof &&
           turn_between(p->device.pose.quat_wxyz, p->device.good.quat_wxyz) >
               HAPI_SAFETY_SPIN_LIMIT * period);

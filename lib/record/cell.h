@@ -113,7 +113,8 @@ enum {
                               pointer in whose device the loop was, 0: none */
   HAPI_CELL_BLOCKED_POINTER_SHIFT = 8,
   /* of POSE and FORCE */
-  HAPI_CELL_FAILED = 1, /* the device did not answer, or did not take it */
+  HAPI_CELL_FAILED = 1,  /* the device did not answer, or did not take it */
+  HAPI_CELL_DOUBTED = 2, /* of POSE: it does not believe what it measures */
   /* of LEAVE */
   HAPI_CELL_PAUSES = 1 /* its device is being started again, and its id stays valid */
 };

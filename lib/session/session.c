@@ -486,6 +486,9 @@ const char *hap_fault_text(hap_fault fault)
     case HAP_FAULT_WORLD:
       return "the ODE world holds a body that cannot be stepped; force is zero until the fault is "
              "reset";
+    case HAP_FAULT_DEVICE_INPUT:
+      return "the device told positions for 18 ms that are not plausible: look at encoders, cables "
+             "and strings; force is zero until the fault is reset";
     case HAP_FAULT_EMERGENCY:
       return "hap_emergency_zero was called; force is zero until the fault is reset";
     case HAP_FAULT_BLOCKED:
@@ -544,7 +547,8 @@ hap_status hap_session_detail(const hap_session *session, hap_detail *out)
              why.text[0] != '\0' ? ": " : "", why.text);
     return HAP_OK;
   }
-  if (fault == HAP_FAULT_DEVICE_READ || fault == HAP_FAULT_DEVICE_WRITE) {
+  if (fault == HAP_FAULT_DEVICE_READ || fault == HAP_FAULT_DEVICE_WRITE ||
+      fault == HAP_FAULT_DEVICE_INPUT) {
     hapi_haptic_explain(session->haptic, (hap_pointer_id){stats.faults.pointer}, &why);
   }
   snprintf(out->text, sizeof out->text, "pointer %u: %s%s%.300s", place, hap_fault_text(fault),

@@ -299,7 +299,7 @@ static hap_status check_join(const hap_player *player, const hapi_cell *cells, u
 static hap_status check_packet(const hap_player *player, const hapi_cell *cells, uint32_t count,
                                hap_detail *detail)
 {
-  if (cells[0].index > HAP_FAULT_EMERGENCY) {
+  if (cells[0].index > HAP_FAULT_DEVICE_INPUT) {
     return play_contradicts(player, "a fault that there is not", detail);
   }
   if (cells[0].kind == HAPI_CELL_TICK &&

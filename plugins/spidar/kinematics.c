@@ -282,7 +282,14 @@ void hapi_spidar_solver_init(hapi_spidar_solver *solver, const hapi_spidar_model
 hapi_spidar_fit hapi_spidar_solve(hapi_spidar_solver *solver, const hapi_spidar_model *model,
                                   const double lengths[HAPI_SPIDAR_STRINGS_MAX])
 {
-  const measured given = {lengths, (1u << model->strings) - 1u};
+  return hapi_spidar_solve_with(solver, model, lengths, (1u << model->strings) - 1u);
+}
+
+hapi_spidar_fit hapi_spidar_solve_with(hapi_spidar_solver *solver, const hapi_spidar_model *model,
+                                       const double lengths[HAPI_SPIDAR_STRINGS_MAX],
+                                       uint32_t strings)
+{
+  const measured given = {lengths, strings};
   for (int i = 0; i < model->strings; ++i) {
     if (!(fabs(lengths[i]) < 1e3)) {
       return HAPI_SPIDAR_FIT_INVALID;

@@ -66,6 +66,11 @@ void hapi_spidar_solver_init(hapi_spidar_solver *solver, const hapi_spidar_model
 hapi_spidar_fit hapi_spidar_solve(hapi_spidar_solver *solver, const hapi_spidar_model *model,
                                   const double lengths[HAPI_SPIDAR_STRINGS_MAX]);
 
+/* The same with some of the strings alone, as bits. */
+hapi_spidar_fit hapi_spidar_solve_with(hapi_spidar_solver *solver, const hapi_spidar_model *model,
+                                       const double lengths[HAPI_SPIDAR_STRINGS_MAX],
+                                       uint32_t strings);
+
 /* Twist that fits the rates of the lengths [m/s] at the pose best; zero where a rate is not
  * finite. */
 void hapi_spidar_twist(const hapi_spidar_model *model, const hap_pose *pose,

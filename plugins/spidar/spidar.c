@@ -11,17 +11,17 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
+#include "base/safety.h"
 #include "base/vec.h"
 
 #define CURRENT_VOLTS (3.3 / 4096.0) /* of a count of current */
 #define SPEED_MOST 10.0              /* m/s of a string */
 #define TAUT_S 0.3                   /* strings are wound in before the first pose is believed */
 #define ANSWER_S 0.25                /* for an exchange of start */
-#define POOR_S 0.3        /* lengths may fit no pose for so long: slack strings being wound in */
-#define PERIOD_S 1e-3     /* between two writes, at least */
-#define BYTE_S 5e-6       /* 10 bits of 2 Mbit/s */
-#define WRITE_LATE_S 0.01 /* a longer pause between two writes counts as this */
-#define LITTLE 0.01       /* of the greatest force */
+#define PERIOD_S 1e-3                /* between two writes, at least */
+#define BYTE_S 5e-6                  /* 10 bits of 2 Mbit/s */
+#define WRITE_LATE_S 0.01            /* a longer pause between two writes counts as this */
+#define LITTLE 0.01                  /* of the greatest force */
 #define WRAP 65536.0
 #define RESCUED_TEXT "the port came back, and the guard has taken the force off there"
 
@@ -95,34 +95,33 @@ static hapi_spidar_fit solve_pose(hapi_spidar_device *device)
   double lengths[HAPI_SPIDAR_STRINGS_MAX];
   read_counts(device, counts);
   hapi_spidar_measure(&device->model, counts, lengths);
-  return hapi_spidar_solve(&device->solver, &device->model, lengths);
+  return hapi_spidar_solve(&device->belief.solver, &device->model, lengths);
 }
 
-/* At the times of the reads, so that poses and twists are of one motion, whatever the port
- * delays. */
-static void update_twist(hapi_spidar_device *device, int64_t time_ns)
+/* Into pose and twist, at the times of the reads, so that both are of one motion, whatever the port
+ * delays. False: replies have been doubted for too long, while all strings were pulled. */
+static bool believe_counts(hapi_spidar_device *device, int64_t time_ns)
 {
   double counts[HAPI_SPIDAR_STRINGS_MAX];
-  double rates[HAPI_SPIDAR_STRINGS_MAX];
-  read_counts(device, counts);
-  hapi_spidar_rates_update(&device->rates, &device->model, time_ns, counts, rates);
-  hapi_spidar_twist(&device->model, &device->solver.pose, rates, &device->twist);
-}
-
-/* False: they have fitted no pose for too long, while all strings were pulled. */
-static bool judge_fit(hapi_spidar_device *device, hapi_spidar_fit fit)
-{
   double now = now_s(device);
-  bool poor = fit == HAPI_SPIDAR_FIT_POOR && !atomic_load(&device->zeroed);
-  if (!poor || device->poor < 0.0) {
-    device->poor = poor ? now : -1.0;
+  read_counts(device, counts);
+  device->doubted =
+      hapi_spidar_belief_update(&device->belief, &device->model, time_ns, counts,
+                                !atomic_load(&device->zeroed)) != HAPI_SPIDAR_BELIEVED;
+  if (!device->doubted || device->poor < 0.0) {
+    device->poor = device->doubted ? now : -1.0;
   }
-  return !poor || now - fmax(device->poor, device->taut) < POOR_S;
+  if (device->doubted) {
+    atomic_store(&device->told.string, device->belief.wrong);
+    atomic_store(&device->told.off_um, (int)fmax(fmin(1e6 * device->belief.error, 1e9), -1e9));
+    atomic_store(&device->told.cause, HAPI_SPIDAR_MISFIT);
+  }
+  return !device->doubted || now - fmax(device->poor, device->taut) < HAPI_SAFETY_MISFIT_S;
 }
 
 static void to_frame(const hapi_spidar_device *device, hap_pose *pose, hap_twist *twist)
 {
-  const hap_pose *grip = &device->solver.pose;
+  const hap_pose *grip = &device->belief.solver.pose;
   const double *r = device->settings.rotate;
   hapi_pose_point(device->settings.offset, r, grip->position, pose->position);
   /* Turned as the grip is, in the axes of the frame: at home it is the identity. */
@@ -131,8 +130,8 @@ static void to_frame(const hapi_spidar_device *device, hap_pose *pose, hap_twist
   hapi_quat_multiply(r, grip->quat_wxyz, turned);
   hapi_quat_multiply(turned, back, pose->quat_wxyz);
   hapi_quat_normalize(pose->quat_wxyz);
-  hapi_quat_rotate(r, device->twist.linear, twist->linear);
-  hapi_quat_rotate(r, device->twist.angular, twist->angular);
+  hapi_quat_rotate(r, device->belief.twist.linear, twist->linear);
+  hapi_quat_rotate(r, device->belief.twist.angular, twist->angular);
 }
 
 /* ---- every tick ---- */
@@ -140,7 +139,7 @@ static void to_frame(const hapi_spidar_device *device, hap_pose *pose, hap_twist
 static hap_status device_fail(hapi_spidar_device *device, hapi_spidar_cause cause)
 {
   set_cause(device, cause);
-  atomic_store(&device->told, (int)cause);
+  atomic_store(&device->told.cause, (int)cause);
   return HAP_ERROR_DEVICE;
 }
 
@@ -159,9 +158,7 @@ static hap_status take_answer(hapi_spidar_device *device, int64_t time_ns)
     return device_fail(device, HAPI_SPIDAR_HUNG_UP);
   }
   if (taken > 0) {
-    hapi_spidar_fit fit = solve_pose(device);
-    update_twist(device, time_ns);
-    if (!judge_fit(device, fit)) {
+    if (!believe_counts(device, time_ns)) {
       return device_fail(device, HAPI_SPIDAR_MISFIT);
     }
     set_cause(device, HAPI_SPIDAR_WELL);
@@ -171,7 +168,7 @@ static hap_status take_answer(hapi_spidar_device *device, int64_t time_ns)
     return device_fail(device,
                        device->line.bad_steps > 0 ? HAPI_SPIDAR_JUMPED : HAPI_SPIDAR_SILENT);
   }
-  return HAP_OK;
+  return device->doubted ? HAP_STALE : HAP_OK;
 }
 
 /* Nobody wrote since the last read: the boards are asked all the same. */
@@ -205,7 +202,7 @@ static hap_status spidar_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   hap_status asked = needs_restart(device) ? HAP_OK : boards_ask(device);
   to_frame(device, pose, twist);
   *buttons = 0;
-  return status < HAP_OK ? status : asked;
+  return asked < HAP_OK && status >= HAP_OK ? asked : status;
 }
 
 /* From write to write, for heat and for the rate of the tensions. */
@@ -233,8 +230,8 @@ static bool strings_pull(hapi_spidar_device *device, const hap_wrench *wanted, h
   /* From no tension at once: some strings later than others would be a force in another direction,
    * and who zeroed brings the force back slowly. */
   device->tensions.seconds = slack ? 0.0 : passed;
-  hap_status status = hapi_spidar_tensions_solve(&device->tensions, &device->model,
-                                                 &device->solver.pose, wanted, tension, reached);
+  hap_status status = hapi_spidar_tensions_solve(
+      &device->tensions, &device->model, &device->belief.solver.pose, wanted, tension, reached);
   tensions_convert(device, tension);
   return status == HAP_SATURATED;
 }
@@ -407,7 +404,7 @@ static bool settle_pose(hapi_spidar_device *device)
 {
   double counts[HAPI_SPIDAR_STRINGS_MAX];
   hapi_spidar_fit fit = HAPI_SPIDAR_FIT_POOR;
-  hapi_spidar_solver_init(&device->solver, &device->model, NULL);
+  hapi_spidar_belief_begin(&device->belief, &device->model, NULL);
   if (device->model.calibrated) {
     unwrap_counts(device);
     fit = HAPI_SPIDAR_FIT_MOVING;
@@ -419,23 +416,27 @@ static bool settle_pose(hapi_spidar_device *device)
     read_counts(device, counts);
     hapi_spidar_calibrate_at(&device->model, NULL, counts);
     device->model.calibrated = true;
-    hapi_spidar_solver_init(&device->solver, &device->model, NULL);
+    hapi_spidar_belief_begin(&device->belief, &device->model, NULL);
     fit = solve_pose(device);
   }
-  return fit != HAPI_SPIDAR_FIT_POOR;
+  if (fit == HAPI_SPIDAR_FIT_POOR) {
+    return false;
+  }
+  hap_pose grip = device->belief.solver.pose;
+  hapi_spidar_belief_begin(&device->belief, &device->model, &grip);
+  return true;
 }
 
 static void reset_ticks(hapi_spidar_device *device)
 {
-  hapi_spidar_solver_init(&device->solver, &device->model, NULL);
-  hapi_spidar_rates_reset(&device->rates);
+  hapi_spidar_belief_begin(&device->belief, &device->model, NULL);
   hapi_spidar_tensions_init(&device->tensions, &device->model);
-  memset(&device->twist, 0, sizeof device->twist);
   memset(&device->held, 0, sizeof device->held);
   memset(device->current, 0, sizeof device->current);
   memset(device->rest, 0, sizeof device->rest);
   device->written = -1.0;
   device->poor = -1.0;
+  device->doubted = false;
   device->asked = false;
 }
 
@@ -491,7 +492,8 @@ static hap_status spidar_start(void *self)
     return HAP_ERROR_DEVICE;
   }
   set_cause(device, HAPI_SPIDAR_WELL);
-  atomic_store(&device->told, HAPI_SPIDAR_WELL);
+  atomic_store(&device->told.cause, HAPI_SPIDAR_WELL);
+  atomic_store(&device->told.string, -1);
   hapi_spidar_port port;
   hapi_spidar_serial_port(&device->serial, &port);
   hapi_spidar_cause cause = HAPI_SPIDAR_UNGUARDED;
@@ -528,7 +530,8 @@ static hap_status spidar_open(const char *args, void **self, hap_detail *detail)
   device->guard.channel = -1;
   atomic_init(&device->zeroed, true);
   atomic_init(&device->cause, HAPI_SPIDAR_WELL);
-  atomic_init(&device->told, HAPI_SPIDAR_WELL);
+  atomic_init(&device->told.cause, HAPI_SPIDAR_WELL);
+  atomic_init(&device->told.string, -1);
   hapi_spidar_heat_init(&device->heat, 0.0);
   hap_status status = hapi_spidar_configure(device, args, detail);
   if (status < HAP_OK) {
@@ -593,12 +596,27 @@ static const char *text_of(hapi_spidar_cause cause)
   return "";
 }
 
+static void explain_string(hapi_spidar_device *device, int string, hap_detail *out)
+{
+  double off = 1e-3 * atomic_load(&device->told.off_um); /* mm */
+  (void)hapi_fail(out, HAP_ERROR_DEVICE,
+                  "%.200s: string %d is %.1f mm too %s for the others: %s, or its encoder is wrong",
+                  device->serial.path, string, fabs(off), off > 0.0 ? "long" : "short",
+                  off > 0.0 ? "is it slack" : "is it broken or off the grip");
+}
+
 static void spidar_explain(void *self, hap_detail *out)
 {
   hapi_spidar_device *device = self;
-  const char *text = text_of((hapi_spidar_cause)atomic_load(&device->told));
+  hapi_spidar_cause cause = (hapi_spidar_cause)atomic_load(&device->told.cause);
+  int wrong = atomic_load(&device->told.string);
+  if (cause == HAPI_SPIDAR_MISFIT && wrong >= 0) {
+    explain_string(device, wrong, out);
+    return;
+  }
+  const char *text = text_of(cause);
   int error = atomic_load(&device->guard.error);
-  bool unguarded = atomic_load(&device->told) == HAPI_SPIDAR_UNGUARDED;
+  bool unguarded = cause == HAPI_SPIDAR_UNGUARDED;
   if (text[0] != '\0') {
     (void)hapi_fail(out, HAP_ERROR_DEVICE, "%.100s: %s%s%.60s%s", device->serial.path, text,
                     unguarded ? ": " : "", unguarded ? strerror(error) : "",

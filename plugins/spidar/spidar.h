@@ -8,9 +8,9 @@
 
 #include <hapode/device_impl.h>
 
+#include "plugins/spidar/belief.h"
 #include "plugins/spidar/calibration.h"
 #include "plugins/spidar/guard.h"
-#include "plugins/spidar/rates.h"
 #include "plugins/spidar/serial.h"
 #include "plugins/spidar/tensions.h"
 
@@ -38,6 +38,13 @@ typedef struct hapi_spidar_settings {
   double rotate[4]; /* the model's axes in it */
 } hapi_spidar_settings;
 
+/* Of the last failure since start, which may be over. */
+typedef struct hapi_spidar_told {
+  _Atomic int cause;  /* hapi_spidar_cause */
+  _Atomic int string; /* MISFIT: which is wrong; < 0: none of them alone */
+  _Atomic int off_um; /* by how much */
+} hapi_spidar_told;
+
 typedef struct hapi_spidar_device {
   hapi_spidar_serial serial;
   hapi_spidar_guard guard;
@@ -56,12 +63,11 @@ typedef struct hapi_spidar_device {
   bool asked;         /* a command went out since the newest read */
   atomic_bool zeroed; /* raised by zero, lowered by write */
   _Atomic int cause;  /* hapi_spidar_cause, of now */
-  _Atomic int told;   /* of the last failure since start, which may be over */
-  hapi_spidar_solver solver;
-  hapi_spidar_rates rates;
-  hap_twist twist; /* of the grip, frame of the model */
-  double poor;     /* s, when the lengths began to fit no pose; < 0: they do */
-  double taut;     /* s, when the strings began to be pulled after a zero */
+  hapi_spidar_told told;
+  hapi_spidar_belief belief;
+  bool doubted; /* the newest reply, or a string of it */
+  double poor;  /* s, when replies began to be doubted; < 0: they are not */
+  double taut;  /* s, when the strings began to be pulled after a zero */
   hapi_spidar_tensions tensions;
   hapi_spidar_heat heat;
   double written; /* s, of the newest write; < 0: the strings had no tension before */

@@ -102,7 +102,7 @@ static hap_status driven_start(void *self)
   const hapi_spidar_port port = {d, port_send, port_receive, port_await, port_now, port_flush};
   d->begun = -1.0;
   atomic_store(&d->device.cause, HAPI_SPIDAR_WELL);
-  atomic_store(&d->device.told, HAPI_SPIDAR_WELL);
+  atomic_store(&d->device.told.cause, HAPI_SPIDAR_WELL);
   return hapi_spidar_begin(&d->device, &port) == HAPI_SPIDAR_WELL ? HAP_OK : HAP_ERROR_DEVICE;
 }
 

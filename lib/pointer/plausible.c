@@ -1,0 +1,298 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "pointer/plausible.h"
+
+#include <string.h>
+
+#include "base/plausible.h"
+#include "base/safety.h"
+#include "base/vec.h"
+
+/* A hand has a bounded acceleration. So a device is near the line from where it was to where it
+ * would be at its velocity: within what the largest change of velocity makes in the time since the
+ * newest position. What is farther off is false, or the device really jumped: an encoder slipped,
+ * somebody pushed it. The two differ by what comes next.
+ *
+ *   false  The next positions are where the line is. Meanwhile the device is carried on, then held.
+ *   jump   The next positions go on from the new place, by the same bound, for a few ms. Then they
+ *          are believed, and contacts begin anew: nobody felt the way there (coupling.c).
+ *   noise  Neither. Doubt adds up, as it does while the device itself says that it does not believe
+ *          what it measures. Force fades with it and then a fault is latched.
+ *
+ * Time between positions is what counts, not the tick: some devices tell the same position for
+ * several ticks. They are known by the time before each change of more than some quanta; the
+ * shortest of the newest ones counts, as a device that rested looks the same once. */
+
+#define QUANTA 3.0      /* by which a difference of differences may be rounded */
+#define STEP_LEAST 2e-5 /* m: less is no step of a device that is slow to tell */
+#define GAP_MOST_S 0.02 /* between two positions */
+#define STOOD_S 0.02    /* after a longer time without a read nothing is known of the way */
+#define TICK_S 1e-3     /* the bound is of this time at least: noise is the same at any rate */
+#define REST 2.0        /* gaps without a new position: it stands still */
+#define VELOCITY_S 2e-3 /* time constant of the velocity that the line has */
+#define FORGET 0.25     /* s of doubt that a second without any takes away */
+
+static double seconds_between(int64_t from_ns, int64_t to_ns)
+{
+  return 1e-9 * (double)(to_ns - from_ns);
+}
+
+static bool pointer_turns(const hapi_pointer *p)
+{
+  return p->shape.hull != NULL && !p->device.three_dof;
+}
+
+/* rad, to the third order of a small angle */
+static double turn_between(const double a[4], const double b[4])
+{
+  double dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+  return 2.0 * sqrt(hapi_max(1.0 - dot * dot, 0.0));
+}
+
+/* Off the line, after some time without another pose. In a ms a hand may hit something; for longer
+ * it is the hand alone that accelerates. */
+static double way_most(const hapi_pointer *p, double seconds)
+{
+  double hit = HAPI_SAFETY_ACCELERATION_LIMIT * TICK_S * TICK_S;
+  double swing = HAPI_SAFETY_SWING_LIMIT * seconds * seconds;
+  return hapi_max(hit, swing) + QUANTA * p->velocity.quantum;
+}
+
+/* How far a place is from the way that begins at from and takes so long. */
+static double off_way(const double from[3], const double velocity[3], double seconds,
+                      const double at[3])
+{
+  double off[3];
+  double along = 0.0;
+  double speed2 = hapi_v3_dot(velocity, velocity);
+  hapi_v3_sub(at, from, off);
+  if (speed2 > 0.0) {
+    along = hapi_max(hapi_min(hapi_v3_dot(off, velocity) / speed2, seconds), 0.0);
+  }
+  hapi_v3_madd(off, -along, velocity, off);
+  return hapi_v3_norm(off);
+}
+
+/* s between two positions, where they come seldom. */
+static double gap_of(const hapi_pointer_belief *b)
+{
+  double least = b->gaps[0];
+  for (int i = 1; i < HAPI_BELIEF_GAPS; ++i) {
+    least = hapi_min(least, b->gaps[i]);
+  }
+  return least;
+}
+
+static double gap_or_tick(const hapi_pointer_belief *b)
+{
+  return hapi_max(gap_of(b), TICK_S);
+}
+
+static bool pose_is_plausible(const hapi_pointer *p, int64_t now_ns)
+{
+  const hapi_pointer_belief *b = &p->belief;
+  const hap_pose *pose = &p->device.pose;
+  double passed = seconds_between(b->sample_ns, now_ns);
+  double tick = seconds_between(b->read_ns, now_ns);
+  double time = hapi_min(passed, hapi_max(gap_of(b), tick));
+  double way[3];
+  hapi_v3_sub(pose->position, b->told.position, way);
+  /* What is told now may be of any time in the last tick. */
+  bool off =
+      off_way(b->told.position, b->velocity, passed + tick, pose->position) > way_most(p, time);
+  if (hapi_v3_norm(way) > HAPI_SAFETY_SPEED_LIMIT * hapi_max(passed, TICK_S)) {
+    return false;
+  }
+  bool turned =
+      pointer_turns(p) && turn_between(pose->quat_wxyz, b->told.quat_wxyz) >
+                              b->spin * passed + HAPI_SAFETY_SPIN_CHANGE * hapi_max(time, TICK_S);
+  return !b->paced || (!off && !turned);
+}
+
+static bool is_news(const hapi_pointer *p)
+{
+  const hap_pose *pose = &p->device.pose;
+  const hap_pose *told = &p->belief.told;
+  return memcmp(pose->position, told->position, sizeof pose->position) != 0 ||
+         (pointer_turns(p) &&
+          memcmp(pose->quat_wxyz, told->quat_wxyz, sizeof pose->quat_wxyz) != 0);
+}
+
+static void gap_note(hapi_pointer_belief *b, double seconds)
+{
+  b->gaps[b->gap_at] = hapi_min(seconds, GAP_MOST_S);
+  b->gap_at = (b->gap_at + 1) % HAPI_BELIEF_GAPS;
+}
+
+/* Whether the pose goes on from those elsewhere. */
+static bool goes_on(const hapi_pointer *p, const double way[3], double tick)
+{
+  const hapi_elsewhere *e = &p->belief.elsewhere;
+  const hap_pose *pose = &p->device.pose;
+  double time = hapi_max(e->since, TICK_S);
+  bool near = e->moved ? off_way(e->pose.position, e->velocity, e->since + tick, pose->position) <=
+                             way_most(p, e->since)
+                       : hapi_v3_norm(way) <= HAPI_SAFETY_SPEED_LIMIT * time;
+  return near && (!pointer_turns(p) || turn_between(pose->quat_wxyz, e->pose.quat_wxyz) <=
+                                           HAPI_SAFETY_SPIN_LIMIT * time);
+}
+
+/* A new place, and then no other for some ticks: the device may be slow. Of one no more than twice
+ * what was known is learned, as it may have jumped as well. */
+static void tell_seldom(hapi_pointer_belief *b, int64_t now_ns)
+{
+  double since = b->elsewhere.since;
+  double before = seconds_between(b->sample_ns, now_ns) - since;
+  double gap = hapi_max(hapi_min(2.0 * gap_of(b), before), since);
+  for (int i = 0; i < HAPI_BELIEF_GAPS; ++i) {
+    gap_note(b, gap);
+  }
+}
+
+/* A pose that is not plausible. True: poses have gone on from there for long enough. */
+static bool follow_elsewhere(hapi_pointer *p, double seconds, int64_t now_ns)
+{
+  hapi_elsewhere *e = &p->belief.elsewhere;
+  const hap_pose *pose = &p->device.pose;
+  double way[3];
+  hapi_v3_sub(pose->position, e->pose.position, way);
+  e->since += seconds;
+  if (!e->known || !goes_on(p, way, seconds)) {
+    *e = (hapi_elsewhere){.known = true, .pose = *pose};
+    return false;
+  }
+  e->seconds += seconds;
+  if (hapi_v3_norm(way) > 0.0 && e->since > 0.0) {
+    hapi_v3_scale(1.0 / e->since, way, e->velocity);
+    gap_note(&p->belief, e->since);
+    e->moved = true;
+    e->since = 0.0;
+  }
+  e->pose = *pose;
+  if (e->seconds < HAPI_SAFETY_CONFIRM_S - 1e-9) {
+    return false;
+  }
+  if (!e->moved) {
+    tell_seldom(&p->belief, now_ns);
+  }
+  return true;
+}
+
+/* At a new place, which the device told after so long. */
+static void sample_take(hapi_pointer *p, int64_t now_ns)
+{
+  hapi_pointer_belief *b = &p->belief;
+  double passed = seconds_between(b->sample_ns, now_ns);
+  double way[3];
+  hapi_v3_sub(p->device.pose.position, b->told.position, way);
+  double step = hapi_v3_norm(way);
+  if (b->elsewhere.known) {
+    hapi_v3_copy(b->elsewhere.velocity, b->velocity);
+  } else if (passed > 0.0) {
+    double share = hapi_min(passed / VELOCITY_S, 1.0);
+    hapi_v3_scale(1.0 - share, b->velocity, b->velocity);
+    hapi_v3_madd(b->velocity, share / passed, way, b->velocity);
+    b->spin =
+        pointer_turns(p) ? turn_between(p->device.pose.quat_wxyz, b->told.quat_wxyz) / passed : 0.0;
+  }
+  if (!b->elsewhere.known && step > hapi_max(QUANTA * p->velocity.quantum, STEP_LEAST)) {
+    gap_note(b, passed);
+  }
+  b->told = p->device.pose;
+  b->sample_ns = now_ns;
+}
+
+/* From where it was felt last: what is nearer comes in as it is, a little late. */
+static bool is_far(const hapi_pointer *p)
+{
+  double way[3];
+  hapi_v3_sub(p->device.pose.position, p->device.good.position, way);
+  return hapi_v3_norm(way) > HAPI_SAFETY_JUMP_LEAST ||
+         (pointer_turns(p) && turn_between(p->device.pose.quat_wxyz, p->device.good.quat_wxyz) >
+                                  HAPI_SAFETY_SPIN_CHANGE * TICK_S);
+}
+
+/* On as it went, no faster than a hand is sure to, and then not at all. */
+static void pose_carry(hapi_pointer *p, int64_t now_ns)
+{
+  const hapi_pointer_belief *b = &p->belief;
+  double passed = seconds_between(b->believe_ns, now_ns);
+  double velocity[3];
+  hapi_v3_copy(b->velocity, velocity);
+  (void)hapi_v3_shorten(velocity, HAPI_SAFETY_CARRY_SPEED);
+  p->device.pose = b->told;
+  hapi_v3_madd(b->told.position, hapi_min(passed, HAPI_SAFETY_CARRY_S), velocity,
+               p->device.pose.position);
+  memset(&p->device.twist, 0, sizeof p->device.twist);
+  if (passed <= HAPI_SAFETY_CARRY_S) {
+    hapi_v3_copy(velocity, p->device.twist.linear);
+  }
+}
+
+/* What doubt takes of the force, and how it goes away. A device that is doubted before it pushes
+ * comes in later: its strings are being wound in. */
+static void doubt_follow(hapi_pointer *p, bool doubted, double seconds)
+{
+  hapi_pointer_belief *b = &p->belief;
+  bool pushes = p->guard.share > 0.0;
+  b->doubted = doubted;
+  b->doubt_s = doubted  ? b->doubt_s + seconds
+               : pushes ? hapi_max(b->doubt_s - FORGET * seconds, 0.0)
+                        : 0.0;
+  double most = pushes ? HAPI_SAFETY_DOUBT_FADE_S : HAPI_SAFETY_MISFIT_S;
+  double loss = (b->doubt_s - HAPI_SAFETY_CARRY_S) / most;
+  double back = b->loss - seconds / HAPI_SAFETY_RAMP_IN_S;
+  b->loss = hapi_min(hapi_max(hapi_max(loss, back), 0.0), 1.0);
+}
+
+bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
+{
+  hapi_pointer *p = pointer;
+  hapi_pointer_belief *b = &p->belief;
+  double seconds = seconds_between(b->read_ns, now_ns);
+  b->jumped = false;
+  if (!(p->device.speed_limit > 0.0) || !hapi_plausible(p->device.pose.position, 3) ||
+      !hapi_plausible(p->device.pose.quat_wxyz, 4)) {
+    b->known = false;
+    return true;
+  }
+  if (!b->known || seconds < 0.0 || seconds > STOOD_S) {
+    b->known = true;
+    b->paced = false;
+    b->told = p->device.pose;
+    b->sample_ns = now_ns;
+    b->elsewhere.known = false;
+    b->spin = seconds = 0.0;
+    hapi_v3_set(b->velocity, 0.0, 0.0, 0.0);
+  }
+  bool news = is_news(p);
+  bool first = now_ns == b->sample_ns;
+  bool believed = !news || pose_is_plausible(p, now_ns);
+  if (!believed) {
+    believed = follow_elsewhere(p, seconds, now_ns);
+    b->jumped = believed && is_far(p);
+  } else {
+    b->elsewhere.known = false;
+  }
+  if (believed && news) {
+    sample_take(p, now_ns);
+  } else if (believed && seconds_between(b->sample_ns, now_ns) > REST * gap_or_tick(b)) {
+    hapi_v3_set(b->velocity, 0.0, 0.0, 0.0);
+    b->spin = 0.0;
+  }
+  if (believed) {
+    b->elsewhere.known = false;
+    b->believe_ns = now_ns;
+  } else {
+    pose_carry(p, now_ns);
+  }
+  b->paced = b->paced || !first;
+  b->read_ns = now_ns;
+  doubt_follow(p, doubted || !believed, seconds);
+  return believed;
+}
+
+void hapi_input_forgive(hapi_pointer *pointer)
+{
+  pointer->belief.doubt_s = pointer->belief.loss = 0.0;
+}
