@@ -26,6 +26,7 @@
 #define HAPI_SAFETY_CONFIRM_S 0.003          /* s */
 #define HAPI_SAFETY_JUMP_LEAST 0.003         /* m */
 #define HAPI_SAFETY_DOUBT_FADE_S 0.014       /* s */
+#define HAPI_SAFETY_UNEXPLAINED_S 0.03       /* s */
 #define HAPI_SAFETY_MISFIT_S 0.3             /* s */
 
 /* ---- how fast force comes and goes ---- */

@@ -11,11 +11,14 @@
 #include "pointer/plausible.h"
 
 /* The last thing between the simulation and the motors, in this order: finite, age of the local
- * model, ramp-in, energy observer, slew, saturation. All of it shapes what the hand feels; the
- * bodies have had their share of the impulse before.
+ * model, ramp-in, doubt about the device, energy observer, what no motion explains, slew,
+ * saturation. All of it shapes what the hand feels; the bodies have had their share of the impulse
+ * before.
  *
  * Slew before saturation holds both bounds: the force before lies within its limit, and shortening
  * is the projection onto a ball, which brings no two points farther apart. */
+
+#define HANDLE 0.05 /* m, arm of a grip: what the way explains of a torque */
 
 void hapi_fault_set(hapi_fault_latch *latch, hap_fault fault, uint32_t pointer, uint32_t generation)
 {
@@ -131,6 +134,27 @@ static bool vector_saturate(double v[3], double limit)
   return true;
 }
 
+/* After a device was not believed, or jumped: the force changes by the stiffness times the way of
+ * the device, and the rest, which no motion explains, comes in slowly. A pose that is believed is
+ * near the one before, so at other times there is no such rest. */
+static void limit_unexplained(double period, hapi_pointer *p)
+{
+  const hapi_guard_pointer *g = &p->guard;
+  if (!(p->belief.doubt_s > 0.0) && !(p->device.jump_s > 0.0)) {
+    return;
+  }
+  double slow = period / HAPI_SAFETY_UNEXPLAINED_S;
+  double scale = p->device.motion_scale * p->device.force_scale;
+  double stiffness = p->surface.stiffness * scale * hapi_max((double)p->contacts, 1.0);
+  double explained = p->device.jumped ? 0.0 : stiffness * hapi_v3_norm(g->moved);
+  bool force = vector_slew(g->written.force, explained + slow * p->device.limits.max_force,
+                           p->device.wrench.force);
+  bool torque =
+      vector_slew(g->written.torque, HANDLE * explained + slow * p->device.limits.max_torque,
+                  p->device.wrench.torque);
+  p->guard.flags |= force || torque ? HAP_GUARD_INPUT : 0;
+}
+
 /* A slew limit that is meant for touch does not keep the force on after a fault. */
 static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
 {
@@ -198,6 +222,9 @@ void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *poi
       continue;
     }
     if (guard->mode == HAP_GUARD_ON) {
+      if (guard->latch.fault == HAP_FAULT_NONE) {
+        limit_unexplained(period, p);
+      }
       limit_slew(guard, period, p);
     }
     bool force_cut = vector_saturate(p->device.wrench.force, p->device.limits.max_force);
