@@ -134,13 +134,13 @@ static bool vector_saturate(double v[3], double limit)
   return true;
 }
 
-/* After a device was not believed, or jumped: the force changes by the stiffness times the way of
+/* After a device was not believed: the force changes by the stiffness times the way of
  * the device, and the rest, which no motion explains, comes in slowly. A pose that is believed is
  * near the one before, so at other times there is no such rest. */
 static void limit_unexplained(double period, hapi_pointer *p)
 {
   const hapi_guard_pointer *g = &p->guard;
-  if (!(p->belief.doubt_s > 0.0) && !(p->device.jump_s > 0.0)) {
+  if (!(p->belief.doubt_s > 0.0)) {
     return;
   }
   double slow = period / HAPI_SAFETY_UNEXPLAINED_S;
