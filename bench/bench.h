@@ -51,6 +51,7 @@ hap_status bench_fig7(bench *b);
 hap_status bench_impedance(bench *b);
 hap_status bench_input(bench *b);
 hap_status bench_jitter(bench *b);
+hap_status bench_late(bench *b);
 hap_status bench_line(bench *b);
 hap_status bench_poses(bench *b);
 hap_status bench_scaling(bench *b);

@@ -51,6 +51,8 @@ static const program programs[] = {
      "the felt force while a device tells positions that are false for 0.2 s"},
     {"jitter", bench_jitter,
      "how late the haptic thread wakes up, against cyclictest; page faults, context switches"},
+    {"late", bench_late,
+     "a loop that is stopped in pulses: force, steps, and what the guard does; --scene NAME"},
     {"line", bench_line, "a SPIDAR at 1 kHz through its emulator: ticks without a new answer"},
     {"poses", bench_poses,
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
@@ -180,7 +182,7 @@ static bool options_fit(const program *p, const bench *b)
   bool known = b->estimates == NULL || strcmp(b->estimates, "all") == 0 ||
                strcmp(b->estimates, "default") == 0;
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
-      p->run != bench_effects && p->run != bench_faults) {
+      p->run != bench_effects && p->run != bench_faults && p->run != bench_late) {
     wrong = "has no scenes to choose from";
   } else if (b->random_worlds > 0 && (p->run != bench_faults || b->scene != NULL)) {
     wrong = "has no random worlds: --random is for faults, without --scene";

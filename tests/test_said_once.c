@@ -9,6 +9,7 @@
 
 #include <hapode/hooks.h>
 
+#include "session/session_internal.h"
 #include "tests/contact_world.h"
 #include "tests/stage.h"
 
@@ -17,12 +18,14 @@
 
 static atomic_int late_lines;
 static atomic_int unsolved_lines;
+static atomic_int derated_lines;
 
 static void count_lines(hap_log_level level, const char *text, void *user)
 {
   (void)user;
   if (level >= HAP_LOG_WARNING) {
     atomic_fetch_add(&late_lines, strstr(text, "takes longer than its period") != NULL);
+    atomic_fetch_add(&derated_lines, strstr(text, "haptic loop come late") != NULL);
     atomic_fetch_add(&unsolved_lines, strstr(text, "than a tick can solve") != NULL);
   }
 }
@@ -34,6 +37,7 @@ static void count_begin(void)
   hooks.log = count_lines;
   atomic_store(&late_lines, 0);
   atomic_store(&unsolved_lines, 0);
+  atomic_store(&derated_lines, 0);
   CHECK(hap_hooks_set(&hooks) == HAP_OK);
 }
 
@@ -89,4 +93,24 @@ TEST(ticks_that_stay_unsolved_are_said_once)
 {
   CHECK(lines_of_row(100) == 1);
   CHECK(lines_of_row(3) == 0);
+}
+
+static int lines_of_gaps(uint32_t stop_ticks)
+{
+  count_begin();
+  contact_world *w = cw_new(CW_GRAVITY);
+  w->research.guard = HAP_GUARD_ON;
+  cw_add_floor(w);
+  cw_start(w, 0.0, 0.0, 0.5);
+  w->session->run_ticks = 10;
+  w->session->stop_ticks = stop_ticks;
+  CHECK(hap_session_advance(w->session, 1000) >= HAP_OK);
+  CHECK(hap_hooks_set(NULL) == HAP_OK);
+  return atomic_load(&derated_lines);
+}
+
+TEST(late_ticks_are_said_once)
+{
+  CHECK(lines_of_gaps(10) == 1);
+  CHECK(lines_of_gaps(0) == 0);
 }

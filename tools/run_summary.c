@@ -51,6 +51,8 @@ static const char *fault_name(hap_fault fault)
       return "device_input";
     case HAP_FAULT_EMERGENCY:
       return "emergency";
+    case HAP_FAULT_LATE:
+      return "late";
     case HAP_FAULT_BLOCKED:
       return "blocked";
   }
@@ -84,6 +86,7 @@ static void print_more(const hap_stats *stats, FILE *out)
   count_print(out, "stale_times", stats->faults.stale_times);
   count_print(out, "slewed_ticks", stats->faults.slewed_ticks);
   count_print(out, "energy_ticks", stats->faults.energy_ticks);
+  count_print(out, "derated_ticks", stats->safety.derated_ticks);
 }
 
 void run_summary_print(const run_options *options, const hap_stats *stats,

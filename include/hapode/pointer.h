@@ -163,6 +163,7 @@ typedef enum hap_guard_flag {
   HAP_GUARD_SLEW = 8,       /* the slew limit held force back */
   HAP_GUARD_SATURATED = 16, /* beyond a limit and shortened, direction kept */
   HAP_GUARD_FAULT = 32,     /* a fault is latched: on the way to zero, or there */
+  HAP_GUARD_LATE = 64,      /* less force: ticks of the loop came late */
   HAP_GUARD_INPUT = 256     /* the device is not believed: carried on, then less and less force */
 } hap_guard_flag;
 

@@ -24,6 +24,7 @@ typedef enum hap_fault {
   HAP_FAULT_DEVICE_WRITE = 5, /* the device's write failed */
   HAP_FAULT_WORLD = 6,        /* the ODE world holds a body that cannot be stepped */
   HAP_FAULT_EMERGENCY = 7,    /* hap_emergency_zero was called */
+  HAP_FAULT_LATE = 8,         /* ticks came too late, or too many were missed, under force */
   HAP_FAULT_BLOCKED = 10,     /* the loop stood still, in a call of a device or elsewhere */
   /* for 18 ms the device told positions that no hand moves to, or said that they are wrong */
   HAP_FAULT_DEVICE_INPUT = 11
@@ -181,6 +182,12 @@ typedef struct hap_error_stats {
   uint64_t spoilt;
 } hap_error_stats;
 
+/* What the guard did because the loop or the device could not be trusted. A tick counts once,
+ * whatever the number of pointers. */
+typedef struct hap_safety_stats {
+  uint64_t derated_ticks; /* ticks in which late ticks had lowered a force (docs/safety.md) */
+} hap_safety_stats;
+
 /* All of it. */
 typedef struct hap_stats {
   uint32_t size; /* bytes filled in */
@@ -193,6 +200,7 @@ typedef struct hap_stats {
   hap_fault_stats faults;
   hap_edit_stats edits;
   hap_error_stats error;
+  hap_safety_stats safety;
 } hap_stats;
 
 /* [any] Copies the statistics into *out. size_of_out: sizeof *out of the caller's build. Each

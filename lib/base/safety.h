@@ -35,6 +35,19 @@
 #define HAPI_SAFETY_FADE_S 0.1       /* s */
 #define HAPI_SAFETY_AGE_LEAST_S 0.01 /* s */
 
+/* ---- late ticks ---- */
+#define HAPI_SAFETY_LATE_GAP_S 0.005     /* s */
+#define HAPI_SAFETY_LATE_FEW_SHARE 0.02  /* 1 */
+#define HAPI_SAFETY_LATE_FEW_S 0.02      /* s */
+#define HAPI_SAFETY_LATE_GAP_DECAY_S 0.2 /* s */
+#define HAPI_SAFETY_LATE_DOWN_S 0.004    /* s */
+#define HAPI_SAFETY_LATE_SLEW_S 0.0125   /* s */
+#define HAPI_SAFETY_LATE_HOLD_S 0.08     /* s */
+#define HAPI_SAFETY_LATE_BACK_S 0.1      /* s */
+#define HAPI_SAFETY_LATE_GAP_MOST_S 0.05 /* s */
+#define HAPI_SAFETY_LATE_SHARE 0.5       /* 1 */
+#define HAPI_SAFETY_LATE_LOST_S 0.2      /* s */
+
 /* ---- contacts that arrive deep ---- */
 #define HAPI_SAFETY_CONTACT_RAMP_S 0.02     /* s */
 #define HAPI_SAFETY_CONTACT_DEPTH 0.01      /* m */

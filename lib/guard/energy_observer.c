@@ -152,9 +152,12 @@ static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *p
     if (!(force2 > 0.0)) {
       continue;
     }
+    double felt = p->guard.felt * (1.0 - p->guard.late_loss);
     *io_stored += p->rigid ? 0.0 : half_compliance(p) * force2 / c->weight;
     if (body != NULL && (body->flags & HAPI_BODY_OWNED) == 0) {
       sum -= work_on(facts->period, body, c);
+    } else if (body != NULL && felt < 1.0) { /* it has the whole force, the hand a share */
+      sum += (1.0 - felt) * work_on(facts->period, body, c);
     }
   }
   return sum;
@@ -196,7 +199,8 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     double rubs = c->mu > 0.0 ? hapi_friction_energy(touches, tick, c) : 0.0;
     gone -= r->sprung;
     if (share != r->felt_share || r->excess != r->felt_excess) { /* seldom */
-      sum += energy - spring_energy(p, c->weight * r->felt_share, r->depth - r->felt_excess);
+      double excess = r->late ? r->excess : r->felt_excess;
+      sum += energy - spring_energy(p, c->weight * r->felt_share, r->depth - excess);
       sum +=
           (p->guard.felt - r->felt) * rubs; /* a deep contact's friction comes in with its limit */
       r->felt_share = share;

@@ -7,6 +7,7 @@
 #include "base/assert.h"
 #include "base/safety.h"
 #include "base/vec.h"
+#include "guard/lateness.h"
 #include "pointer/coupling.h"
 #include "pointer/plausible.h"
 
@@ -38,6 +39,7 @@ void hapi_guard_reset_fault(hapi_guard *guard, const hapi_pointers *pointers,
   }
   guard->latch.fault = HAP_FAULT_NONE;
   guard->latch.pointer = guard->latch.generation = 0;
+  hapi_lateness_forgive(&guard->late);
   for (uint32_t i = 0; i < pointers->high; ++i) {
     pointers->of[i].guard.share = 0.0;
     hapi_input_forgive(&pointers->of[i]);
@@ -79,7 +81,7 @@ static void follow_age(hapi_guard *guard, const hapi_tick_facts *facts)
   guard->stale_times += stale && !guard->stale;
   guard->stale_ticks += stale;
   guard->stale = stale;
-  double change = stale        ? facts->period / HAPI_SAFETY_FADE_S
+  double change = stale        ? guard->late.elapsed_s / HAPI_SAFETY_FADE_S
                   : step > 0.0 ? -facts->period / step
                                : 0.0;
   guard->age_loss = hapi_min(hapi_max(guard->age_loss + change, 0.0), 1.0);
@@ -93,8 +95,10 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
   g->wanted = p->device.wrench;
   g->flags = 0;
   if (guard->latch.fault != HAP_FAULT_NONE) {
+    bool fades = guard->latch.fault == HAP_FAULT_LATE;
     g->flags = HAP_GUARD_FAULT;
-    memset(&p->device.wrench, 0, sizeof p->device.wrench);
+    hapi_v3_scale(fades ? guard->late.fade : 0.0, g->written.force, p->device.wrench.force);
+    hapi_v3_scale(fades ? guard->late.fade : 0.0, g->written.torque, p->device.wrench.torque);
     return;
   }
   if (guard->mode == HAP_GUARD_MEASURE) {
@@ -102,10 +106,11 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
   }
   bool waits = g->share <= 0.0 && p->belief.doubted;
   g->share = waits ? 0.0 : hapi_min(g->share + period / HAPI_SAFETY_RAMP_IN_S, 1.0);
-  double share = g->share * (1.0 - guard->age_loss) * (1.0 - p->belief.loss);
+  double share = g->share * (1.0 - guard->age_loss) * (1.0 - p->belief.loss) * (1.0 - g->late_loss);
   g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;
   g->flags |= guard->age_loss > 0.0 ? HAP_GUARD_STALE : 0;
   g->flags |= p->belief.doubted || p->belief.loss > 0.0 ? HAP_GUARD_INPUT : 0;
+  g->flags |= g->late_loss > 0.0 ? HAP_GUARD_LATE : 0;
   hapi_v3_scale(share, p->device.wrench.force, p->device.wrench.force);
   hapi_v3_scale(share, p->device.wrench.torque, p->device.wrench.torque);
 }
@@ -160,12 +165,17 @@ static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
 {
   const hapi_guard_pointer *g = &p->guard;
   bool fault = guard->latch.fault != HAP_FAULT_NONE;
+  period = fault ? guard->late.elapsed_s : period;
   double force_rate =
       fault ? hapi_max(p->device.limits.slew_force, p->device.limits.max_force / HAPI_SAFETY_FADE_S)
             : p->device.limits.slew_force;
   double torque_rate = fault ? hapi_max(p->device.limits.slew_torque,
                                         p->device.limits.max_torque / HAPI_SAFETY_FADE_S)
                              : p->device.limits.slew_torque;
+  if (!fault && guard->late.slew_s > 0.0) { /* what a gap has changed is not felt at once */
+    force_rate = hapi_min(force_rate, p->device.limits.max_force / HAPI_SAFETY_LATE_SLEW_S);
+    torque_rate = hapi_min(torque_rate, p->device.limits.max_torque / HAPI_SAFETY_LATE_SLEW_S);
+  }
   bool force = vector_slew(g->written.force, period * force_rate, p->device.wrench.force);
   bool torque = vector_slew(g->written.torque, period * torque_rate, p->device.wrench.torque);
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
@@ -204,6 +214,11 @@ void hapi_guard_begin(hapi_guard *guard, const hapi_tick_facts *facts,
     if (p->generation != 0 && p->belief.loss >= 1.0) {
       hapi_fault_set(&guard->latch, HAP_FAULT_DEVICE_INPUT, i + 1, p->generation);
     }
+  }
+  bool late = hapi_lateness_follow(guard, facts, pointers);
+  hapi_lateness_fade(&guard->late, late && guard->latch.fault == HAP_FAULT_NONE);
+  if (late) {
+    hapi_fault_set(&guard->latch, HAP_FAULT_LATE, 0, 0);
   }
   follow_age(guard, facts);
   for (uint32_t i = 0; i < pointers->high; ++i) {

@@ -24,6 +24,19 @@ typedef struct hapi_fault_latch {
   uint64_t count;
 } hapi_fault_latch;
 
+/* How late ticks come. */
+typedef struct hapi_lateness {
+  double elapsed_s; /* between the last two, at least T */
+  double few_s;     /* lost time, of which a little a second is forgotten */
+  double lost_s;    /* lost under force, of which half of all time is forgotten */
+  double gap_s;     /* the longest of the last gaps that count, shrinking */
+  double hold_s;    /* for so long more the gap counts */
+  double slew_s;    /* for so long more after a long gap the force changes slowly */
+  double fade_s;    /* after the fault: until the force is gone */
+  double fade;      /* 0..1, share of the last force that this tick keeps of it */
+  uint64_t derated_ticks;
+} hapi_lateness;
+
 /* What the guard keeps of the whole loop. */
 typedef struct hapi_guard {
   hap_guard mode;
@@ -40,6 +53,7 @@ typedef struct hapi_guard {
   double sprung;     /* J, sum over the contacts of the last tick */
   double touch_s;    /* s, since something is felt without a break */
   int64_t observed_ns; /* time of the last tick */
+  hapi_lateness late;
   hapi_fault_latch latch;
 } hapi_guard;
 

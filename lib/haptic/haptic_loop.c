@@ -91,6 +91,7 @@ static void figures_publish(hapi_haptic *haptic)
   STORE(faults.stale_ticks, tick->guard.stale_ticks);
   STORE(hand.slewed_ticks, tick->guard.slewed_ticks);
   STORE(hand.energy_ticks, tick->guard.energy_ticks);
+  STORE(hand.derated_ticks, tick->guard.late.derated_ticks);
   STORE(loop.model, (int)tick->facts.model);
   STORE(loop.hash, tick->hashing && tick->facts.tick > 0 ? tick->hash : 0);
   STORE(loop.age_ns, age);
@@ -131,6 +132,7 @@ static void state_report(hapi_haptic *haptic)
   hapi_state *state = hapi_exchange_state_back(haptic->config.exchange);
   hapi_tick_report(&haptic->tick, state);
   state->load = haptic->load;
+  state->derated = haptic->tick.guard.late.derated_ticks > 0;
   state->unsolved = haptic->tick.rows.unsolved_most;
   hapi_exchange_state_publish(haptic->config.exchange);
 }
@@ -422,6 +424,7 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   out->faults.stale_ticks = LOAD(faults.stale_ticks);
   out->faults.slewed_ticks = LOAD(hand.slewed_ticks);
   out->faults.energy_ticks = LOAD(hand.energy_ticks);
+  out->safety.derated_ticks = LOAD(hand.derated_ticks);
   out->loop.realtime = atomic_load(&haptic->thread.realtime) ? 1 : 0;
   out->loop.trace_dropped = LOAD(loop.trace_dropped);
   out->loop.trace_hash = LOAD(loop.hash);

@@ -44,10 +44,12 @@ static inline double hapi_ramp_follow(hapi_ramp *r, bool *io_seen, const hapi_po
   } else if (!*io_seen || depth - hapi_max(r->depth, 0.0) > most) {
     hapi_contact_ramp_begin(r, depth, p->device.jump_s > 0.0);
     *io_seen = true;
-  } else if (r->share < 1.0 || r->excess > 0.0) {
+  } else if (r->share < 1.0 || r->excess > 0.0 || p->device.stood > 0.0) {
     double comes_in = r->held ? 0.0 : HAPI_SAFETY_CONTACT_SPEED * period;
     r->share = depth > 0.0 ? hapi_min(r->share + period / HAPI_SAFETY_CONTACT_RAMP_S, 1.0) : 1.0;
-    r->excess = hapi_max(hapi_min(r->excess, depth) - comes_in, 0.0);
+    double went_on = p->device.stood * hapi_max(depth - hapi_max(r->depth, 0.0), 0.0);
+    r->excess = hapi_max(hapi_min(r->excess, depth) - comes_in, 0.0) + went_on;
+    r->late = r->excess > 0.0 && (r->late || went_on > 0.0);
   }
   r->depth = depth;
   *io_depth = depth - r->excess;

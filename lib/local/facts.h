@@ -18,8 +18,10 @@ typedef struct hapi_tick_facts {
   double period; /* s, T */
   uint64_t tick; /* number of this one */
   int64_t now_ns;
-  bool faulted;  /* a fault is latched: no contact pushes */
-  bool observes; /* the energy observer watches, if the guard's mode has one */
+  int64_t read_ns; /* time of the tick before */
+  double elapsed;  /* s, since that tick, at least T: more where ticks were missed */
+  bool faulted;    /* a fault is latched: no contact pushes */
+  bool observes;   /* the energy observer watches, if the guard's mode has one */
 
   hap_model model;
   uint32_t wishes; /* base/wishes.h */

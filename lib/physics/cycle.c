@@ -248,6 +248,11 @@ static void cycle_tell(hapi_physics *physics, double seconds)
                   "more bodies touch than a tick can solve: the force is approximate "
                   "(hap_stats.contact.residual_max)");
   }
+  if (cycle->state != NULL && cycle->state->derated) {
+    hapi_say_once(cycle, &physics->said_derated,
+                  "ticks of the haptic loop come late: the force is lowered meanwhile "
+                  "(hap_stats.safety.derated_ticks); real time or less to do would help");
+  }
 }
 
 static void note_times(hapi_physics *physics, const double seconds[5], double looked_s)

@@ -62,6 +62,7 @@ struct hapi_physics {
   double late_s;     /* of cycles that took longer than their period, one after the other */
   bool said_late;
   bool said_unsolved;
+  bool said_derated;
 };
 
 /* cycle.c: the collision phase, and testing simulations */

@@ -12,7 +12,11 @@
  *
  * A device that is farther from where it was at the last tick than a hand can move it in a tick has
  * jumped: an encoder slipped, or the loop did not run for some time. The contacts that are deep by
- * it begin anew (contact_ramp.h), also those that come with the next models. */
+ * it begin anew (contact_ramp.h), also those that come with the next models.
+ *
+ * Over missed ticks the device goes on and the bodies stand still. After a long gap, the way that
+ * it went on is not pressed in at once: surfaces and the springs of proxies go with it, and come
+ * back slowly. Over a short gap nobody feels it, and the energy observer knows it exactly. */
 
 /* A sphere has torque of friction alone, and only on a device that turns it. */
 void hapi_pointer_feel(hapi_pointer *p, hap_effect_wish wish, bool rubs)
@@ -133,8 +137,10 @@ static bool input_is_plausible(const hapi_pointer *p)
           hapi_plausible(w, 3));
 }
 
-uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double physics_period)
+uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double elapsed,
+                            double physics_period)
 {
+  double stood = elapsed - period > HAPI_SAFETY_LATE_GAP_S ? 1.0 - period / elapsed : 0.0;
   uint32_t unusable = 0;
   for (uint32_t i = 0; i < pointers->high; ++i) {
     hapi_pointer *p = &pointers->of[i];
@@ -142,14 +148,18 @@ uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double
       continue;
     }
     bool good = input_is_plausible(p);
+    p->device.stood = p->device.placed ? stood : 0.0;
     p->device.jumped = good && pointer_jumps(p, period);
     p->device.jump_s =
         p->device.jumped ? HAPI_SAFETY_JUMP_S + 2.0 * physics_period : p->device.jump_s - period;
     pointer_check_speed(p);
+    const hapi_pointer_handle before = p->handle;
     if (!good || !pointer_place(p)) {
       unusable = unusable == 0 ? i + 1 : unusable;
     } else if (p->device.jumped) {
       hapi_proxy_begin_anew(p);
+    } else if (p->device.stood > 0.0) {
+      hapi_proxy_catch_up(p, &before);
     }
   }
   return unusable;

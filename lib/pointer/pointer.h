@@ -49,6 +49,7 @@ typedef struct hapi_pointer_device {
   bool jumped;        /* between the last one and this one; see coupling.c */
   uint32_t buttons;   /* in */
   double jump_s;      /* s, > 0: contacts that arrive deep are so because of a jump */
+  double stood;       /* 0..1, share of the time since the last read in which ticks were missed */
   double speed_limit; /* m/s, that a hand can make; 0: none */
   double motion_scale;
   double force_scale;
@@ -149,6 +150,7 @@ typedef struct hapi_rigid_move {
  * pointer that has just come. */
 typedef struct hapi_guard_pointer {
   double share;       /* 0..1, of the ramp-in */
+  double late_loss;   /* 0..1, share of the force that late ticks have taken */
   bool placed;        /* position and moved are of the device as it is now */
   double position[3]; /* at the last tick */
   double quat[4];

@@ -46,6 +46,21 @@ void hapi_proxy_begin_anew(hapi_pointer *p)
   hapi_v3_set(p->proxy.offset_turn, 0.0, 0.0, 0.0);
 }
 
+void hapi_proxy_catch_up(hapi_pointer *p, const hapi_pointer_handle *before)
+{
+  double way[3];
+  double turn[3];
+  if (!p->proxied) {
+    return;
+  }
+  hapi_v3_sub(p->handle.position, before->position, way);
+  hapi_v3_madd(p->proxy.offset, -p->device.stood, way, p->proxy.offset);
+  if (p->shape.hull != NULL) {
+    hapi_proxy_turn_between(before->quat, p->handle.quat, turn);
+    hapi_v3_madd(p->proxy.offset_turn, -p->device.stood, turn, p->proxy.offset_turn);
+  }
+}
+
 static bool is_above(const hapi_pointer *p)
 {
   double kept = p->proxied ? KEEP_SHARE * p->coupling.hold : p->coupling.hold;

@@ -26,6 +26,10 @@ void hapi_proxy_free(hapi_pointer *p, double t, double v[6]);
  * device is. */
 bool hapi_proxy_move(hapi_pointer *pointer, double period, const double v[6]);
 
+/* After missed ticks: of the way of the device since before, the share in which the loop stood
+ * still stretches the spring slowly. */
+void hapi_proxy_catch_up(hapi_pointer *pointer, const hapi_pointer_handle *before);
+
 /* It begins anew where the device is. */
 void hapi_proxy_begin_anew(hapi_pointer *pointer);
 

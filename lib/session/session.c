@@ -341,6 +341,13 @@ static void find_contacts_when_due(hap_session *session)
   }
 }
 
+/* False: the loop is stopped in this tick's time. */
+static bool tick_runs(const hap_session *session)
+{
+  uint64_t turn = session->run_ticks + session->stop_ticks;
+  return session->stop_ticks == 0 || session->tick % turn < session->run_ticks;
+}
+
 hap_status hap_session_advance(hap_session *session, uint64_t ticks)
 {
   if (session == NULL) {
@@ -361,10 +368,17 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
   }
   for (uint64_t i = 0; i < ticks; ++i) {
     int64_t now = time_of(session, session->tick);
-    hapi_haptic_receive(session->haptic, now);
+    bool runs = tick_runs(session);
+    if (runs) {
+      hapi_haptic_receive(session->haptic, now);
+    }
     step_when_due(session);
     find_contacts_when_due(session);
-    hapi_haptic_cycle(session->haptic, now);
+    if (runs) {
+      hapi_haptic_cycle(session->haptic, now);
+    } else {
+      hapi_haptic_count_missed(session->haptic, 1);
+    }
     atomic_fetch_add_explicit(&session->tick, 1, memory_order_relaxed);
   }
   return drive_outcome(session, lost);
@@ -491,6 +505,9 @@ const char *hap_fault_text(hap_fault fault)
              "and strings; force is zero until the fault is reset";
     case HAP_FAULT_EMERGENCY:
       return "hap_emergency_zero was called; force is zero until the fault is reset";
+    case HAP_FAULT_LATE:
+      return "the haptic loop came too late under force (missed_ticks); give it real time or less "
+             "to do; force is zero until the fault is reset";
     case HAP_FAULT_BLOCKED:
       return "the loop stood still and a watchdog took the force off; force is zero until the "
              "fault "

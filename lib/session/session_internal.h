@@ -39,6 +39,10 @@ struct hap_session {
   uint64_t step;
   uint64_t pass_tick; /* of the next one of the contact thread's part */
 
+  /* LOCKSTEP, for tests and the bench: after run_ticks, stop_ticks are left out; 0: none */
+  uint32_t run_ticks;
+  uint32_t stop_ticks;
+
   double frame_remainder_s; /* FRAME */
   pthread_t starter;        /* thread of the last start */
 

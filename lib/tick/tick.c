@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/hash.h"
+#include "base/vec.h"
 #include "guard/energy_observer.h"
 #include "guard/force_guard.h"
 #include "paper/local_dynamics.h"
@@ -107,9 +108,12 @@ void hapi_tick_reset_fault(hapi_tick *tick)
 
 void hapi_tick_read(hapi_tick *tick, int64_t now_ns)
 {
-  tick->facts.now_ns = now_ns;
+  hapi_tick_facts *facts = &tick->facts;
+  double since = facts->tick > 0 ? 1e-9 * (double)(now_ns - facts->read_ns) : 0.0;
+  facts->elapsed = hapi_max(since, facts->period);
+  facts->now_ns = facts->read_ns = now_ns;
   uint32_t unusable =
-      hapi_coupling_read(&tick->pointers, tick->facts.period, tick->facts.physics_period);
+      hapi_coupling_read(&tick->pointers, facts->period, facts->elapsed, facts->physics_period);
   if (unusable > 0) {
     hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, unusable);
   }

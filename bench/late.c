@@ -1,0 +1,167 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+#include <math.h>
+#include <string.h>
+
+#include "bench/late.h"
+#include "session/session_internal.h"
+#include "tools/rig.h"
+
+/* hapode-bench late: a loop that is stopped in pulses. The virtual clock leaves out the ticks of
+ * each pulse, and the simulated hand goes on with the force that was held. Every run is compared
+ * with the same one without pulses. */
+
+#define LATE_HZ 1000
+
+typedef struct late_felt {
+  double force[3];
+  double peak; /* N */
+  double step; /* N, the largest from tick to tick */
+  unsigned steps;
+} late_felt;
+
+static void felt_take(late_felt *felt, const double force[3])
+{
+  double change = 0.0;
+  double norm = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    change += (force[i] - felt->force[i]) * (force[i] - felt->force[i]);
+    norm += force[i] * force[i];
+    felt->force[i] = force[i];
+  }
+  felt->peak = fmax(felt->peak, sqrt(norm));
+  felt->step = fmax(felt->step, sqrt(change));
+  felt->steps += sqrt(change) > LATE_STEP_N;
+}
+
+static hap_status late_tick(bench *b, const rig *r, late_felt *felt)
+{
+  hap_status status = hap_session_advance(r->session, 1);
+  if (status < HAP_OK) {
+    return bench_explain(b, r->session, status);
+  }
+  for (size_t i = 0; i < r->pointer_count; ++i) {
+    hap_pointer_state state;
+    memset(&state, 0, sizeof state);
+    (void)hap_pointer_get(r->session, r->pointers[i], &state, sizeof state);
+    if (i == 0) {
+      felt_take(felt, state.wrench.force);
+    }
+  }
+  return HAP_OK;
+}
+
+static hap_status late_ticks(bench *b, const rig *r, const late_def *def, late_result *out)
+{
+  late_felt felt = {{0.0}, 0.0, 0.0, 0};
+  hap_stats stats;
+  uint64_t derated = 0;
+  for (int t = 0; t < def->ticks; ++t) {
+    bool pulsed = t >= def->begin && t < def->end;
+    r->session->run_ticks = def->run_ticks;
+    r->session->stop_ticks = pulsed ? def->stop_ticks : 0;
+    hap_status status = late_tick(b, r, &felt);
+    if (status < HAP_OK) {
+      return status;
+    }
+    (void)hap_session_stats(r->session, &stats, sizeof stats);
+    if (t >= def->end && stats.safety.derated_ticks > derated) {
+      out->back_ms = t + 1 - def->end;
+    }
+    derated = stats.safety.derated_ticks;
+  }
+  out->peak = felt.peak;
+  out->step = felt.step;
+  out->steps = felt.steps;
+  out->derated = derated;
+  out->fault = stats.faults.fault;
+  out->missed = stats.loop.missed_ticks;
+  return HAP_OK;
+}
+
+hap_status late_run(bench *b, const late_def *def, late_result *out)
+{
+  rig r;
+  rig_options options;
+  memset(out, 0, sizeof *out);
+  rig_options_init(&options);
+  options.scene = def->scene;
+  options.def.drive = HAP_DRIVE_LOCKSTEP;
+  options.def.haptic_hz = LATE_HZ;
+  if (def->device != NULL) {
+    options.devices[0] = def->device;
+    options.device_count = 1;
+  }
+  hap_status status = rig_create(&options, &r, &b->detail);
+  if (status < HAP_OK) {
+    return status;
+  }
+  status = hap_session_start(r.session);
+  status = status < HAP_OK ? bench_explain(b, r.session, status) : late_ticks(b, &r, def, out);
+  rig_destroy(&r);
+  return status;
+}
+
+/* ---- the program ---- */
+
+typedef struct late_pulse {
+  uint32_t stop;
+  uint32_t run;
+} late_pulse;
+
+#define LATE_HEADER                                                                            \
+  "scene,stop_ms,run_ms,begin_ms,peak_n,peak_ratio,steps,steps_without,step_n,missed,derated," \
+  "fault,back_ms"
+
+static hap_status late_row(bench *b, FILE *csv, late_def def, const late_result *still)
+{
+  late_result now;
+  hap_status status = late_run(b, &def, &now);
+  if (status < HAP_OK) {
+    return status;
+  }
+  double ratio = still->peak > 0.0 ? now.peak / still->peak : 1.0;
+  bool told = now.fault != HAP_FAULT_NONE || now.derated > 0 || def.stop_ticks <= 5;
+  bool back = now.fault != HAP_FAULT_NONE || now.back_ms <= LATE_BACK_MS;
+  fprintf(csv, "%s,%u,%u,%d,%.4f,%.3f,%u,%u,%.3f,%llu,%llu,%s,%d\n", def.scene, def.stop_ticks,
+          def.run_ticks, def.begin, now.peak, ratio, now.steps, still->steps, now.step,
+          (unsigned long long)now.missed, (unsigned long long)now.derated,
+          now.fault == HAP_FAULT_NONE ? "none" : "latched", now.back_ms);
+  bench_check(
+      b, told && back && ratio <= LATE_PEAK_RATIO && now.steps <= LATE_PEAK_RATIO * still->steps,
+      "%s %u/%u ms from %d ms: %.2f N, %.2f of that without pulses; %u steps above 2 N "
+      "(%u without), largest %.2f N; %llu ticks with less force%s, back after %d ms",
+      def.scene, def.stop_ticks, def.run_ticks, def.begin, now.peak, ratio, now.steps, still->steps,
+      now.step, (unsigned long long)now.derated,
+      now.fault == HAP_FAULT_NONE ? "" : ", then a fault", now.back_ms);
+  return HAP_OK;
+}
+
+static hap_status late_scene(bench *b, FILE *csv, const char *name)
+{
+  static const late_pulse pulses[] = {{8, 8}, {12, 4}, {15, 5}, {30, 10}, {3, 1}, {45, 45}};
+  late_def def = {.scene = name, .ticks = 2500, .run_ticks = 1};
+  late_result still;
+  hap_status status = late_run(b, &def, &still);
+  for (size_t i = 0; i < BENCH_COUNT(pulses); ++i) {
+    for (int begin = 300; begin < (b->quick ? 301 : 1200); begin += 107) {
+      def.begin = begin;
+      def.end = begin + 1000;
+      def.stop_ticks = pulses[i].stop;
+      def.run_ticks = pulses[i].run;
+      if (status >= HAP_OK) {
+        status = late_row(b, csv, def, &still);
+      }
+    }
+  }
+  return status;
+}
+
+hap_status bench_late(bench *b)
+{
+  FILE *csv = bench_csv_open(b, "late", LATE_HEADER);
+  return csv == NULL
+             ? bench_csv_close(b, csv, HAP_OK)
+             : bench_csv_close(b, csv, late_scene(b, csv, b->scene != NULL ? b->scene : "row10"));
+}

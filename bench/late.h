@@ -1,0 +1,40 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BENCH_LATE_H
+#define HAPODE_BENCH_LATE_H
+
+#include <stdint.h>
+
+#include <hapode/stats.h>
+
+#include "bench/bench.h"
+
+#define LATE_STEP_N 2.0     /* a change from tick to tick that counts as a step */
+#define LATE_PEAK_RATIO 1.2 /* bound of peak and steps */
+#define LATE_BACK_MS 200
+
+/* A run in which a loop of 1 kHz is stopped in pulses, from tick begin to tick end. */
+typedef struct late_def {
+  const char *scene;
+  const char *device; /* spec; NULL: the scene's own */
+  int ticks;
+  int begin;
+  int end;
+  uint32_t stop_ticks; /* left out; 0: none */
+  uint32_t run_ticks;  /* in between */
+} late_def;
+
+/* Of the first pointer. */
+typedef struct late_result {
+  double peak; /* N */
+  double step; /* N, largest change from tick to tick */
+  unsigned steps;
+  uint64_t missed;
+  uint64_t derated; /* ticks with less force */
+  uint32_t fault;   /* hap_fault at the end */
+  int back_ms;      /* from the last pulse to the last tick with less force */
+} late_result;
+
+hap_status late_run(bench *b, const late_def *def, late_result *out);
+
+#endif

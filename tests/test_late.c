@@ -1,0 +1,365 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Ticks that come late: what is taken from the force, when it comes back, when a fault latches,
+ * and what a hand feels of it. Time is that of a virtual clock. */
+
+#include "tests/tap.h"
+
+#include "base/safety.h"
+#include "bench/late.h"
+#include "guard/lateness.h"
+#include "tests/tick_world.h"
+
+#define LIMIT 20.0 /* N */
+
+/* ---- the rule alone ---- */
+
+/* A pointer of 1000 N/m that is under force. */
+static hapi_pointer *late_pointer(void)
+{
+  set_up();
+  f.tick.guard.mode = HAP_GUARD_ON;
+  hapi_pointer *p = add_pointer(0, 0.0, 0.0, 0.0);
+  p->guard.written.force[0] = 5.0;
+  f.tick.pointers.high = 1;
+  return p;
+}
+
+/* A tick after so many missed ones; what is taken of the pointer's force. */
+static double late_tick(int missed)
+{
+  f.tick.facts.elapsed = (missed + 1) * T;
+  if (hapi_lateness_follow(&f.tick.guard, &f.tick.facts, &f.tick.pointers)) {
+    hapi_tick_fault(&f.tick, HAP_FAULT_LATE, 0);
+  }
+  return f.pointers[0].guard.late_loss;
+}
+
+static double late_ticks(int ticks)
+{
+  for (int i = 0; i < ticks; ++i) {
+    (void)late_tick(0);
+  }
+  return f.pointers[0].guard.late_loss;
+}
+
+static bool late_is_good(void)
+{
+  return f.tick.guard.late.derated_ticks == 0 && f.tick.guard.latch.fault == HAP_FAULT_NONE;
+}
+
+TEST(gaps_of_5_ms_and_less_than_a_hundredth_missed_take_nothing)
+{
+  (void)late_pointer();
+  for (int i = 0; i < 200; ++i) { /* 5 of 600 */
+    (void)late_tick(5);
+    (void)late_ticks(594);
+  }
+  CHECK(late_is_good());
+  for (int i = 0; i < 200; ++i) { /* 1 of 101, in time with nothing */
+    (void)late_tick(1);
+    (void)late_ticks(99 + i % 3);
+  }
+  CHECK(late_is_good());
+  for (int i = 0; i < 20; ++i) { /* all that 2 s may miss at once */
+    (void)late_tick(5), (void)late_tick(5), (void)late_tick(5), (void)late_tick(4);
+    (void)late_ticks(1981);
+  }
+  CHECK(late_is_good());
+}
+
+TEST(more_missed_ticks_than_that_take_force_however_short_the_gaps_are)
+{
+  (void)late_pointer();
+  int ticks = 0;
+  while (late_tick(1) == 0.0 && ticks < 100) {
+    ++ticks;
+  }
+  CHECK(ticks >= 19 && ticks <= 23);    /* 20 ms are lost, one of two */
+  CHECK_NEAR(late_ticks(3), 0.5, 0.02); /* writes are 2 T apart */
+}
+
+TEST(a_longer_gap_takes_force_in_four_ticks_holds_it_down_and_gives_it_back)
+{
+  (void)late_pointer();
+  CHECK(late_tick(5) == 0.0);
+  (void)late_ticks(2000);
+  CHECK_NEAR(late_tick(6), 0.25, 1e-12);
+  CHECK_NEAR(late_tick(0), 0.5, 1e-12);
+  CHECK_NEAR(late_tick(0), 0.75, 1e-12);
+  CHECK(late_tick(0) > 1.0 - 1.0 / 6.7); /* the stiffness that it holds falls as 1 / 7 */
+  for (int i = 4; i < 80; ++i) {
+    double loss = late_tick(0);
+    CHECK(loss >= 1.0 - 1.0 / 4.0 && loss <= 1.0 - 1.0 / 7.0);
+  }
+  for (int i = 80; i < 120; ++i) {
+    CHECK(late_tick(0) > 0.3);
+  }
+  CHECK(late_ticks(60) == 0.0); /* 180 ms after the gap */
+  uint64_t derated = f.tick.guard.late.derated_ticks;
+  CHECK(derated > 150 && derated < 180);
+  CHECK(late_ticks(100) == 0.0 && f.tick.guard.late.derated_ticks == derated);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE);
+}
+
+TEST(the_longest_gap_counts_and_is_forgotten_while_shorter_ones_go_on)
+{
+  (void)late_pointer();
+  (void)late_tick(39);
+  CHECK(late_ticks(5) > 1.0 - 1.0 / 37.0);
+  (void)late_tick(7);
+  CHECK(late_ticks(5) > 1.0 - 1.0 / 30.0); /* that of 40 T still */
+  for (int i = 0; i < 20; ++i) {
+    (void)late_tick(7);
+    (void)late_ticks(30);
+  }
+  CHECK_NEAR(late_tick(7), 1.0 - 1.0 / 8.0, 0.03);
+}
+
+TEST(a_device_that_holds_more_than_it_touches_keeps_more)
+{
+  hapi_pointer *p = late_pointer();
+  p->coupling.hold_known = true;
+  p->coupling.hold = 4000.0; /* four times the pointer's stiffness: good for 4 T */
+  (void)late_tick(7);
+  CHECK_NEAR(late_ticks(3), 1.0 - 4.0 / 7.88, 0.01);
+  (void)late_ticks(300);
+  p->coupling.contact_stiffness = 2000.0; /* two contacts at once */
+  (void)late_tick(7);
+  CHECK_NEAR(late_ticks(3), 1.0 - 2.0 / 7.88, 0.01);
+  (void)late_ticks(300);
+  p->coupling.contact_stiffness = 8000.0; /* more than it holds: not above T */
+  (void)late_tick(7);
+  CHECK_NEAR(late_ticks(5), 1.0 - 1.0 / 7.8, 0.01);
+  (void)late_ticks(300);
+  p->proxied = true;
+  p->coupling.stiffness = 4000.0; /* of the spring, whatever is touched behind it */
+  (void)late_tick(7);
+  CHECK_NEAR(late_ticks(5), 1.0 - 1.0 / 7.8, 0.01);
+}
+
+static int ticks_to_fault(int missed, int run, bool force)
+{
+  hapi_pointer *p = late_pointer();
+  p->guard.written.force[0] = force ? 5.0 : 0.0;
+  for (int t = 0; t < 5000;) {
+    (void)late_tick(missed);
+    (void)late_ticks(run - 1);
+    t += missed + run;
+    if (f.tick.guard.latch.fault == HAP_FAULT_LATE) {
+      return t;
+    }
+  }
+  return 0;
+}
+
+TEST(a_fault_latches_where_more_than_half_of_the_time_is_lost_under_force)
+{
+  CHECK(ticks_to_fault(3, 1, true) >= 790 && ticks_to_fault(3, 1, true) <= 820); /* 0.2 / 0.25 */
+  CHECK(ticks_to_fault(12, 4, true) >= 760 && ticks_to_fault(12, 4, true) <= 830);
+  CHECK(ticks_to_fault(12, 4, false) == 0);
+  CHECK(ticks_to_fault(8, 8, true) == 0); /* half: less force, no fault */
+  CHECK(ticks_to_fault(6, 5, true) == 0 || ticks_to_fault(6, 5, true) > 3000);
+  CHECK(ticks_to_fault(11, 10, true) > 0 || f.tick.guard.late.derated_ticks > 0);
+}
+
+TEST(a_fault_latches_after_one_gap_of_more_than_50_ms_under_force)
+{
+  CHECK(ticks_to_fault(48, 1000, true) == 0);
+  CHECK(ticks_to_fault(51, 1000, true) == 1051);
+  CHECK(ticks_to_fault(300, 1000, false) == 0);
+}
+
+TEST(a_reset_forgives_what_was_lost)
+{
+  (void)ticks_to_fault(3, 1, true);
+  hapi_tick_reset_fault(&f.tick);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE);
+  for (int i = 0; i < 100; ++i) { /* half of what it takes */
+    (void)late_tick(3);
+  }
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE);
+}
+
+TEST(a_measuring_guard_takes_nothing)
+{
+  (void)late_pointer();
+  f.tick.guard.mode = HAP_GUARD_MEASURE;
+  for (int i = 0; i < 100; ++i) {
+    CHECK(late_tick(60) == 0.0);
+  }
+  CHECK(late_is_good());
+}
+
+/* ---- a tick ---- */
+
+/* 5 mm deep in a wall, 5 N. */
+static hapi_pointer *late_wall(hap_model model)
+{
+  set_up();
+  f.tick.guard.mode = HAP_GUARD_ON;
+  hapi_pointer *p = add_pointer(0, -0.1, 0.0, 0.0);
+  p->device.limits.max_force = LIMIT;
+  p->device.limits.slew_force = LIMIT / 0.002;
+  p->device.limits.slew_torque = 500.0;
+  p->device.speed_limit = 10.0;
+  f.model->model = model;
+  begin_model();
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  model_adopt();
+  ticks_run(1);
+  f.tick.facts.physics_period = 0.0; /* the wall does not grow old */
+  for (int i = 0; i < 95; ++i) {
+    p->device.pose.position[0] += 1e-3;
+    ticks_run(1);
+  }
+  ticks_run(30);
+  CHECK_NEAR(p->device.wrench.force[0], -5.0, 1e-9);
+  CHECK(p->guard.flags == 0);
+  return p;
+}
+
+static void ticks_miss(int ticks)
+{
+  f.now_ns += ticks * TICK_NS;
+}
+
+TEST(the_force_goes_down_and_up_slowly_and_says_why)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  p->device.limits.max_force = 10.0;
+  ticks_miss(19);
+  double before = 5.0;
+  double least = 5.0;
+  for (int i = 0; i < 200; ++i) {
+    ticks_run(1);
+    double force = -p->device.wrench.force[0];
+    CHECK(fabs(force - before) <= 0.8 + 1e-9); /* the whole force in 12.5 ms */
+    CHECK(i > 170 || (p->guard.flags & HAP_GUARD_LATE) != 0);
+    CHECK(i < 10 || i > 70 || force < 5.0 / 10.0);
+    least = fmin(least, force);
+    before = force;
+  }
+  CHECK_NEAR(least, 5.0 / 20.0, 0.02);
+  CHECK_NEAR(before, 5.0, 1e-9);
+  CHECK(p->guard.flags == 0 && f.tick.guard.slewed_ticks > 2 && f.tick.guard.energy_ticks == 0);
+}
+
+TEST(what_the_hand_went_in_a_gap_is_not_pressed_in_at_once)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  ticks_miss(7);
+  p->device.pose.position[0] += 4e-3;
+  ticks_run(1);
+  CHECK_NEAR(p->guard.wanted.force[0], -5.5, 1e-9); /* an eighth of the way */
+  ticks_run(1);
+  CHECK_NEAR(p->guard.wanted.force[0], -5.7, 1e-9); /* 0.2 m/s */
+  ticks_run(20);
+  CHECK_NEAR(p->guard.wanted.force[0], -9.0, 1e-9);
+  ticks_miss(7);
+  p->device.pose.position[0] -= 4e-3; /* out: at once */
+  ticks_run(1);
+  CHECK_NEAR(p->guard.wanted.force[0], -5.0, 1e-9);
+  ticks_run(300);
+  ticks_miss(4); /* a short one */
+  p->device.pose.position[0] += 1e-3;
+  ticks_run(1);
+  CHECK_NEAR(p->guard.wanted.force[0], -6.0, 1e-9);
+}
+
+TEST(the_spring_of_a_proxy_is_not_stretched_at_once_by_a_gap)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  p->coupling.kind = HAP_COUPLING_PROXY;
+  p->coupling.hold_known = true;
+  p->coupling.hold = p->coupling.stiffness = 1000.0;
+  f.tick.pointers.proxies = true;
+  ticks_run(200);
+  CHECK(p->proxied);
+  double before = -p->guard.wanted.force[0];
+  ticks_miss(7);
+  p->device.pose.position[0] += 4e-3;
+  ticks_run(1);
+  double once = -p->guard.wanted.force[0] - before;
+  ticks_run(300);
+  double all = -p->guard.wanted.force[0] - before;
+  printf("# %.3g N at once, %.3g N in the end\n", once, all);
+  CHECK(all > 1.9 && once > 0.05 * all && once < 0.25 * all);
+}
+
+TEST(a_late_fault_fades_the_force_over_100_ms_however_few_ticks_come)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  ticks_miss(60);
+  ticks_run(1);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_LATE && f.tick.guard.latch.pointer == 0);
+  CHECK(p->guard.flags == HAP_GUARD_FAULT);
+  double before = -p->device.wrench.force[0];
+  CHECK_NEAR(before, 5.0 * 0.39, 0.01); /* 61 of 100 ms are over */
+  ticks_miss(9);
+  ticks_run(1);
+  CHECK_NEAR(-p->device.wrench.force[0], 5.0 * 0.29, 0.01);
+  ticks_run(30);
+  CHECK(p->device.wrench.force[0] == 0.0);
+  hapi_tick_reset_fault(&f.tick);
+  ticks_run(250);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE && p->device.wrench.force[0] < 0.0);
+}
+
+TEST(other_faults_take_the_force_by_the_time_that_has_passed)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  p->device.limits.slew_force = 1.0; /* N/s: 100 ms then, 200 N/s */
+  hapi_tick_fault(&f.tick, HAP_FAULT_WORLD, 0);
+  ticks_miss(9);
+  ticks_run(1);
+  CHECK_NEAR(p->device.wrench.force[0], -3.0, 1e-9);
+  ticks_run(1);
+  CHECK_NEAR(p->device.wrench.force[0], -2.8, 1e-9);
+}
+
+TEST(an_old_model_fades_by_the_time_that_has_passed)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  f.tick.facts.physics_period = 0.005;
+  ticks_run(1);
+  double loss = f.tick.guard.age_loss;
+  ticks_miss(4);
+  ticks_run(1);
+  CHECK_NEAR(f.tick.guard.age_loss - loss, 0.05, 1e-9);
+  CHECK((p->guard.flags & HAP_GUARD_STALE) != 0);
+}
+
+/* ---- a hand ---- */
+
+/* peak and steps: no more than 1.2 of what they are without pulses. */
+static void check_pulses(const char *scene, uint32_t stop, uint32_t run)
+{
+  bench b = {.out = "."};
+  late_def def = {.scene = scene, .ticks = 2500, .run_ticks = 1};
+  late_result still;
+  late_result now;
+  REQUIRE(late_run(&b, &def, &still) >= HAP_OK);
+  CHECK(still.derated == 0 && still.missed == 0 && still.steps == 0 && still.peak > 4.0);
+  def.stop_ticks = stop, def.run_ticks = run;
+  for (def.begin = 300; def.begin < 1200; def.begin += 614) {
+    def.end = def.begin + 1000;
+    REQUIRE(late_run(&b, &def, &now) >= HAP_OK);
+    printf("# %s %u/%u from %d: %.3g N of %.3g, %u steps, %llu derated, fault %u, back %d ms\n",
+           scene, stop, run, def.begin, now.peak, still.peak, now.steps,
+           (unsigned long long)now.derated, now.fault, now.back_ms);
+    CHECK(now.missed > 400 && now.derated > 200);
+    CHECK(now.peak <= 1.2 * still.peak && now.steps == 0);
+    CHECK(now.fault == HAP_FAULT_LATE || (now.fault == 0 && now.back_ms <= 200));
+  }
+}
+
+TEST(a_loop_stopped_in_pulses_shakes_no_hand)
+{
+  static const uint32_t pulses[4][2] = {{8, 8}, {12, 4}, {15, 5}, {30, 10}};
+  for (int i = 0; i < 4; ++i) {
+    check_pulses("row10", pulses[i][0], pulses[i][1]);
+    check_pulses("wedge", pulses[i][0], pulses[i][1]);
+  }
+}
