@@ -101,7 +101,7 @@ TEST(a_wrong_value_is_answered_with_what_is_allowed)
       {"--seconds 1x", "--seconds", "86400"},
       {"--seconds", "--seconds", "needs a value"},
       {"--lockstep=1", "--lockstep", "no value"},
-      {"--rt-priority 100", "--rt-priority", "0 to 99"},
+      {"--rt-priority 100", "--rt-priority", "0 to 98"},
       {"--impulse-pose bent", "--impulse-pose", "held nor interpolated"},
       {"--probe twice", "--probe", "shared, paper or operating"},
       {"--model-age 0.01", "--model-age", "--lockstep"},

@@ -164,6 +164,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   hapi_tape_begin(haptic, start_ns);
   hapi_pointers_follow(haptic);
   hapi_pointers_read(haptic, start_ns);
+  hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_NONE, 0); /* until the loop runs */
   hapi_tape_begun(haptic);
   hapi_tick_read(&haptic->tick, start_ns);
   state_report(haptic);
