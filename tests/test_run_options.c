@@ -85,6 +85,8 @@ TEST(single_settings_stay_when_they_are_given)
         expert->max_edge_probes == 0);
   CHECK(options_refused("--iterations 0", "--iterations", "1 to 10000"));
   CHECK(options_refused("--iterations worlds", "--iterations", "1 to 10000"));
+  CHECK(options_parse("--substeps 4") == HAP_OK && expert->substeps == 4);
+  CHECK(options_refused("--substeps 65", "--substeps", "1 to 64"));
   CHECK(options_refused("--sweeps 1", "--sweeps", "2 to 10000"));
   CHECK(options_refused("--sweeps 2.5", "--sweeps", "whole number"));
   CHECK(options_refused("--range -1", "--range", "0 to 1024"));

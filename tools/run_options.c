@@ -263,6 +263,10 @@ static const option table[] = {
      "of QuickStep, 1 to 10000, or as many as the scene has whatever --accuracy says\n"
      "(default: these at 0.5)",
      take_iterations, offsetof(run_options, rig.expert.iterations), 1, 10000},
+    {"--substeps", "N",
+     "parts of a step of the world, 1 to 64, each with its own collision phase (default 1); model\n"
+     "contact",
+     take_count, offsetof(run_options, rig.expert.substeps), 1, 64},
     {"--sweeps", "N",
      "model contact: over all rows, in each solve of a tick, 2 to 10000; 2: no direct\n"
      "solve (default: until it is solved, or the tick has no more time)",

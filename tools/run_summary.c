@@ -87,6 +87,10 @@ static void print_more(const hap_stats *stats, FILE *out)
   count_print(out, "slewed_ticks", stats->faults.slewed_ticks);
   count_print(out, "energy_ticks", stats->faults.energy_ticks);
   count_print(out, "derated_ticks", stats->safety.derated_ticks);
+  count_print(out, "unsolved_ticks", stats->room.unsolved_ticks);
+  count_print(out, "range_most", stats->room.range_most);
+  count_print(out, "range_cut", stats->room.range_cut);
+  number_print(out, "update_ns", stats->room.update_ns);
 }
 
 void run_summary_print(const run_options *options, const hap_stats *stats,

@@ -53,12 +53,12 @@ typedef struct hap_session_def {
   /* Hz, 1..1000 and at most haptic_hz, default 60: steps of the world. Not used by model SINGLE */
   double physics_hz;
   double haptic_hz; /* Hz, 100..20000, default 1000: ticks of the loop */
-  /* bodies that the loop moves itself, 1..1024, default 128. It knows as many again of those
+  /* bodies that the loop moves itself, 1..1024, default 256. It knows as many again of those
    * around them */
   int32_t max_bodies;
-  /* 1..4096, default 2048: of contact points between bodies, of pairs of nearby geoms, and of
-   * pointer contacts, this many each. The contact points nearest to a touch are kept: give at
-   * least 12 for each of max_bodies */
+  /* 1..4096, default 3072: of contact points between bodies and of pointer contacts, this many
+   * each, and of pairs of nearby geoms three times as many. The contact points nearest to a touch
+   * are kept: give at least 12 for each of max_bodies */
   int32_t max_contacts;
   int32_t max_pointers; /* 1..16, default 4 */
   /* SCHED_FIFO priority of the haptic thread, 0..98, default 80. Physics runs at half of it, the

@@ -188,6 +188,17 @@ typedef struct hap_safety_stats {
   uint64_t derated_ticks; /* ticks in which late ticks had lowered a force (docs/safety.md) */
 } hap_safety_stats;
 
+/* Model CONTACT: what a tick has time for. In drive LOCKSTEP and in a replay no time of this
+ * machine counts. */
+typedef struct hap_room_stats {
+  uint64_t unsolved_ticks; /* ticks whose solver left 3 mm/s or more undone */
+  uint64_t turns;          /* times that update_ns was set anew */
+  double update_ns;        /* ns, of a row update: by what the ticks took. 12 in drive LOCKSTEP */
+  uint64_t tick_work;      /* row updates that a tick has time for, at that pace */
+  uint32_t range_most;     /* bodies that the range may own in the newest model, up to max_bodies */
+  uint32_t range_cut;      /* 1: the newest range ends there, and more bodies could be touched */
+} hap_room_stats;
+
 /* All of it. */
 typedef struct hap_stats {
   uint32_t size; /* bytes filled in */
@@ -201,6 +212,7 @@ typedef struct hap_stats {
   hap_edit_stats edits;
   hap_error_stats error;
   hap_safety_stats safety;
+  hap_room_stats room;
 } hap_stats;
 
 /* [any] Copies the statistics into *out. size_of_out: sizeof *out of the caller's build. Each

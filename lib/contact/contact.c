@@ -72,7 +72,7 @@ struct hapi_contact {
   hapi_near *near; /* newest one that the loop is ready for; NULL: none yet */
   hapi_poses *poses;
   pass_body *bodies; /* capacity.bodies */
-  pass_pair *pairs;  /* capacity.contacts */
+  pass_pair *pairs;  /* capacity.pairs */
   tool_memory tools;
   uint64_t number;
   uint32_t lingers;          /* passes that are made although nothing is left to find */
@@ -818,7 +818,7 @@ hap_status hapi_contact_create(const hapi_contact_config *config, hapi_contact *
   }
   contact->config = *config;
   contact->bodies = hapi_alloc_array(config->capacity.bodies, sizeof *contact->bodies);
-  contact->pairs = hapi_alloc_array(config->capacity.contacts, sizeof *contact->pairs);
+  contact->pairs = hapi_alloc_array(config->capacity.pairs, sizeof *contact->pairs);
   tool_memory *tools = &contact->tools;
   const uint32_t most = config->capacity.tool_points;
   tools->geoms = hapi_alloc_array(most, sizeof *tools->geoms);

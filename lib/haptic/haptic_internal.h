@@ -72,6 +72,7 @@ typedef struct hapi_loop_figures {
 typedef struct hapi_solver_figures {
   _Atomic uint64_t sweeps;
   _Atomic double residual;
+  _Atomic uint64_t unsolved_ticks;
   _Atomic uint32_t local_contacts;
 } hapi_solver_figures;
 
@@ -131,6 +132,14 @@ typedef struct hapi_standstill {
   _Atomic uint64_t happened; /* the newest of those */
 } hapi_standstill;
 
+/* What ticks take, and what they do in it. */
+typedef struct hapi_loop_time {
+  double last_tick_us;
+  int64_t tick_budget_ns; /* of the model in use */
+  hapi_tick_load load;
+  hapi_tick_work work;
+} hapi_loop_time;
+
 struct hapi_haptic {
   hapi_haptic_config config;
   hapi_tick tick;
@@ -150,9 +159,7 @@ struct hapi_haptic {
   uint64_t emergencies; /* calls of hap_emergency_zero that the loop has seen */
   bool begun;
   int64_t start_ns;
-  double last_tick_us;
-  int64_t tick_budget_ns; /* of the model in use */
-  hapi_tick_load load;
+  hapi_loop_time time;
 
   hapi_tape *tape;            /* of a recording or a replay; NULL: none */
   hapi_cell *note;            /* recording: first cell of the packet */

@@ -13,6 +13,8 @@
 #include "haptic/tick_memory.h"
 #include "tick/report.h"
 
+#define LATE_SHARE 0.9 /* of its period, that a tick may take */
+
 #define STORE(field, value) \
   atomic_store_explicit(&haptic->figures.field, (value), memory_order_relaxed)
 #define LOAD(field) atomic_load_explicit(&haptic->figures.field, memory_order_relaxed)
@@ -101,6 +103,7 @@ static void figures_publish(hapi_haptic *haptic)
   STORE(hand.peak_force, tick->guard.peak_force);
   STORE(solver.sweeps, tick->rows.sweeps);
   STORE(solver.residual, tick->rows.residual_max);
+  STORE(solver.unsolved_ticks, tick->rows.unsolved_all);
   STORE(solver.local_contacts, tick->facts.model == HAP_MODEL_CONTACT ? tick->contacts.active : 0);
   STORE(hand.impulse_abs, tick->touches.hand_impulse_abs);
   for (int i = 0; i < 3; ++i) {
@@ -131,7 +134,9 @@ static void state_report(hapi_haptic *haptic)
 {
   hapi_state *state = hapi_exchange_state_back(haptic->config.exchange);
   hapi_tick_report(&haptic->tick, state);
-  state->load = haptic->load;
+  state->load = haptic->time.load;
+  hapi_tick_report_work(&haptic->tick, &haptic->time.work);
+  state->work = haptic->time.work;
   state->derated = haptic->tick.guard.late.derated_ticks > 0;
   state->unsolved = haptic->tick.rows.unsolved_most;
   hapi_exchange_state_publish(haptic->config.exchange);
@@ -152,9 +157,10 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   haptic->pending = NULL;
   haptic->pending_patches = NULL;
   haptic->start_ns = start_ns;
-  haptic->last_tick_us = 0.0;
-  haptic->tick_budget_ns = 0;
-  memset(&haptic->load, 0, sizeof haptic->load);
+  haptic->time.last_tick_us = 0.0;
+  haptic->time.tick_budget_ns = 0;
+  memset(&haptic->time.load, 0, sizeof haptic->time.load);
+  memset(&haptic->time.work, 0, sizeof haptic->time.work);
   hap_status status = hapi_pointers_start_devices(haptic, detail);
   if (status < HAP_OK) {
     return status;
@@ -229,7 +235,7 @@ static void messages_receive(hapi_haptic *haptic, int64_t now_ns)
   take_messages(haptic);
   if (haptic->pending != NULL && now_ns >= haptic->pending->valid_from_ns) {
     haptic->tick.facts.now_ns = now_ns;
-    haptic->tick_budget_ns = haptic->pending->tick_budget_ns;
+    haptic->time.tick_budget_ns = haptic->pending->tick_budget_ns;
     hapi_tick_adopt(&haptic->tick, haptic->pending, now_ns);
     haptic->pending = NULL;
     STORE(loop.models_adopted, LOAD(loop.models_adopted) + 1);
@@ -304,11 +310,16 @@ static void time_note(hapi_haptic *haptic, int64_t begin_ns)
   int64_t spent_ns = hapi_clock_now() - begin_ns;
   hapi_histogram_add(&haptic->figures.loop.tick_ns, spent_ns);
   hapi_loop_sample_end(haptic, spent_ns);
-  haptic->last_tick_us = 1e-3 * (double)spent_ns;
-  if (haptic->tick_budget_ns > 0) {
-    ++haptic->load.ticks;
-    haptic->load.over += spent_ns > haptic->tick_budget_ns;
-    haptic->load.spent_ns += (double)spent_ns;
+  haptic->time.last_tick_us = 1e-3 * (double)spent_ns;
+  ++haptic->time.work.ticks;
+  haptic->time.work.spent_ns += (double)spent_ns;
+  const hapi_work *work = &haptic->tick.rows.work;
+  haptic->time.work.late += work->most > 0 && work->done > work->most / 4 &&
+                            (double)spent_ns > LATE_SHARE * 1e9 / haptic->config.haptic_hz;
+  if (haptic->time.tick_budget_ns > 0) {
+    ++haptic->time.load.ticks;
+    haptic->time.load.over += spent_ns > haptic->time.tick_budget_ns;
+    haptic->time.load.spent_ns += (double)spent_ns;
   }
 }
 
@@ -328,7 +339,7 @@ static void trace_write(hapi_haptic *haptic)
   hap_trace_row *row = &ring->rows[written % ring->capacity];
   hapi_tick_trace(&haptic->tick, row);
   row->t = 1e-9 * (double)(haptic->tick.facts.now_ns - haptic->start_ns);
-  row->tick_us = haptic->last_tick_us;
+  row->tick_us = haptic->time.last_tick_us;
   atomic_store_explicit(&ring->written, written + 1, memory_order_release);
 }
 
@@ -414,6 +425,7 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   out->contact.points = LOAD(solver.local_contacts);
   out->contact.sweeps = LOAD(solver.sweeps);
   out->contact.residual_max = LOAD(solver.residual);
+  out->room.unsolved_ticks = LOAD(solver.unsolved_ticks);
   out->hand.impulse_ns = hapi_v3_norm(impulse);
   out->hand.impulse_abs_ns = LOAD(hand.impulse_abs);
   out->hand.peak_force_n = LOAD(hand.peak_force);

@@ -28,14 +28,24 @@ typedef struct hapi_row_source {
   double stays;    /* m/s, of a row that pushes out: its target without that */
 } hapi_row_source;
 
+/* What a tick does, in row updates of the solver. It is counted and not timed: a run in lockstep,
+ * or in a replay, goes the same way on every machine. */
+typedef struct hapi_work {
+  uint64_t most; /* of a tick, solves stop there; 0: no bound */
+  uint64_t done; /* in this tick */
+  uint64_t all;  /* since start */
+} hapi_work;
+
 typedef struct hapi_rows {
   hapi_solver solver;
+  hapi_work work;
   hapi_row_source *sources; /* of the rows; capacity */
   uint32_t capacity;
   double residual_max; /* m/s; this and the next since start */
   uint64_t sweeps;
   uint32_t unsolved;      /* ticks in a row of which HAPI_UNSOLVED or more was left undone */
   uint32_t unsolved_most; /* since start */
+  uint64_t unsolved_all;  /* ticks, likewise */
 } hapi_rows;
 
 /* What a unit impulse along j does to the body's velocity. */

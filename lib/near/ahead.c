@@ -137,7 +137,7 @@ static bool island_add(hapi_nearby *nearby, uint32_t known)
   if (visit->island_in == range->number) {
     return true;
   }
-  if (ahead->island_count + range->owned >= nearby->cycle->config->max_bodies) {
+  if (ahead->island_count + range->owned >= hapi_range_most(nearby->cycle)) {
     return false;
   }
   HAPI_ASSERT_INDEX(ahead->island_count, nearby->cycle->config->capacity.bodies);
@@ -238,7 +238,7 @@ static void ahead_walk(hapi_nearby *nearby)
   ahead->count = 0;
   if (hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_RANGE) ||
       nearby->cycle->settings.range_hops != HAP_RANGE_ALL ||
-      range->owned >= nearby->cycle->config->max_bodies ||
+      range->owned >= hapi_range_most(nearby->cycle) ||
       nearby->visit_capacity < nearby->world->bodies.high) { /* no memory for what walks note */
     return;
   }

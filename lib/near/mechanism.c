@@ -18,7 +18,7 @@ static bool add_member(hapi_nearby *nearby, uint32_t known)
   bool moves = !dBodyIsKinematic(known_body(nearby, known)->body);
   nearby->visits[known].gathered_in = range->number;
   if (range->mechanism.count == nearby->cycle->config->capacity.bodies ||
-      range->owned + range->mechanism.moving + moves > nearby->cycle->config->max_bodies) {
+      !hapi_range_has_room(nearby, range->mechanism.moving + moves)) {
     ++nearby->counts.dropped;
     return false;
   }

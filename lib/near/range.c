@@ -28,9 +28,13 @@
 #define LINK_FLOOR 0.005 /* m, at least so near counts as a link */
 #define LINK_GRAVITY 9.81
 
-static uint32_t range_capacity(const hapi_nearby *nearby)
+bool hapi_range_has_room(hapi_nearby *nearby, uint32_t bodies)
 {
-  return nearby->cycle->config->max_bodies;
+  hapi_range *range = &nearby->range;
+  uint32_t most = hapi_range_most(nearby->cycle);
+  bool room = range->owned + bodies <= most;
+  range->cut = range->cut || (!room && most < nearby->cycle->config->max_bodies);
+  return room;
 }
 
 static const hapi_known_body *known_body(const hapi_nearby *nearby, uint32_t known)
@@ -183,7 +187,7 @@ static void add_pair(hapi_nearby *nearby, const hapi_link *link, uint32_t geom_a
   hapi_near *near = range->near;
   bool turned = link->turned;
   if (geom_a == HAPI_NONE || geom_b == HAPI_NONE ||
-      near->pair_count == nearby->cycle->config->capacity.contacts) {
+      near->pair_count == nearby->cycle->config->capacity.pairs) {
     ++nearby->counts.dropped;
     return;
   }
@@ -694,14 +698,14 @@ bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_
                   : 0;
     io->geoms += triangles;
     io->points += 3 * triangles;
-    io->pairs += parts.all ? parts.pairs : c->contacts + 1;
+    io->pairs += parts.all ? parts.pairs : c->pairs + 1;
     if (!parts.other_is_mesh) {
       need_geom(nearby, link->other, io);
     }
   }
   return range->near->geom_count + io->geoms <= c->geoms &&
          range->near->point_count + io->points <= c->hull_points &&
-         range->near->pair_count + io->pairs <= c->contacts;
+         range->near->pair_count + io->pairs <= c->pairs;
 }
 
 static void take_links(hapi_nearby *nearby)
@@ -749,7 +753,7 @@ static bool mechanism_can_be_owned(hapi_nearby *nearby)
 {
   hapi_range *range = &nearby->range;
   hapi_range_need n = {0, 0, 0};
-  if (range->owned + range->mechanism.moving > range_capacity(nearby)) {
+  if (!hapi_range_has_room(nearby, range->mechanism.moving)) {
     return false;
   }
   for (uint32_t i = 0; i < range->mechanism.moving; ++i) {
@@ -807,7 +811,7 @@ static void range_expand(hapi_nearby *nearby, uint32_t index, bool seed)
   }
   bool refused = visit->gathered_in == range->number; /* with another body of its mechanism */
   range->hops = hops;
-  if (!refused && within_hops(nearby, hops) && range->owned < range_capacity(nearby) &&
+  if (!refused && within_hops(nearby, hops) && hapi_range_has_room(nearby, 1) &&
       hapi_mechanism_gather(nearby, index) && mechanism_can_be_owned(nearby)) {
     own_mechanism(nearby);
     return;
@@ -836,8 +840,8 @@ bool hapi_range_follow(hapi_nearby *nearby, uint32_t known)
 static void range_expand_further(hapi_nearby *nearby)
 {
   hapi_range *range = &nearby->range;
-  for (uint32_t i = 0; i < nearby->world->bodies.high && range->owned < range_capacity(nearby);
-       ++i) {
+  for (uint32_t i = 0;
+       i < nearby->world->bodies.high && range->owned < hapi_range_most(nearby->cycle); ++i) {
     const hapi_known_body *known = known_body(nearby, i);
     if (known->body == NULL || !is_dynamic(known->body) ||
         nearby->visits[i].ranged_in == range->number) {
@@ -864,7 +868,7 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
   range->near->contact_hz = nearby->cycle->settings.contact_hz;
   range->near->always = hapi_wish_is_on(nearby->cycle->wishes, HAP_EFFECT_PASSES);
   range->links.pairs_noted = 0;
-  range->refused = false;
+  range->refused = range->cut = false;
   range->hops = 0;
   range->mechanism.joint_count = range->mechanism.count = range->mechanism.moving = 0;
   range->fastest = 0.0;
@@ -954,7 +958,7 @@ bool hapi_range_create(hapi_nearby *nearby)
   range->mechanism.joints = hapi_alloc_array(c->joints, sizeof *range->mechanism.joints);
   range->ahead.island = hapi_alloc_array(c->bodies, sizeof *range->ahead.island);
   range->links.pair_place_count = 4;
-  while (range->links.pair_place_count < 4 * c->contacts) {
+  while (range->links.pair_place_count < 4 * c->pairs) {
     range->links.pair_place_count *= 2;
   }
   range->links.pair_places =

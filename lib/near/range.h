@@ -15,6 +15,7 @@
 #include "near/geom_names.h"
 #include "sync/messages.h"
 #include "world/bodies.h"
+#include "world/cycle.h"
 #include "world/surfaces.h"
 
 typedef struct hapi_nearby hapi_nearby;
@@ -86,6 +87,7 @@ typedef struct hapi_range {
   uint32_t seeds;   /* neighbours: the first of the queue */
   uint32_t bounces; /* surfaces of this walk that give back speed */
   bool refused;     /* a body within the hops that the loop cannot own */
+  bool cut;         /* a tick has no time for more bodies: settings.range_bodies */
   double fastest;   /* m/s, of the pointers */
   hapi_geom_names names;
   hapi_links links;
@@ -101,6 +103,16 @@ void hapi_range_reset(hapi_nearby *nearby);
 void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count);
 void hapi_range_end(hapi_nearby *nearby, uint32_t hit_count); /* what else the wishes ask for */
 void hapi_range_publish(hapi_nearby *nearby); /* with the model of the same number */
+
+/* Bodies that it may own: max_bodies, or fewer. */
+static inline uint32_t hapi_range_most(const hapi_cycle *cycle)
+{
+  uint32_t most = cycle->config->max_bodies;
+  return cycle->settings.range_bodies < most ? cycle->settings.range_bodies : most;
+}
+
+/* Room for so many bodies more; without it the range is noted to end there. */
+bool hapi_range_has_room(hapi_nearby *nearby, uint32_t bodies);
 
 /* What is near the body: range.links. */
 void hapi_range_links(hapi_nearby *nearby, const hapi_known_body *known);

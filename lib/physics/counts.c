@@ -42,6 +42,12 @@ void hapi_counts_show(hapi_physics *physics)
   shown->error.spoilt = physics->lookback.counts.spoilt;
   shown->error.force_error = physics->lookback.counts.force_error;
   shown->error.force_error_n = physics->lookback.counts.force_error_n;
+  shown->room.turns = physics->room.turns;
+  shown->room.update_ns = hapi_room_update_ns(physics->room.pace);
+  shown->room.tick_work =
+      hapi_room_work(physics->room.pace + physics->room.margin, physics->config.haptic_hz);
+  shown->room.range_most = physics->room.bodies;
+  shown->room.range_cut = physics->near.range.cut;
   const hapi_near_counts *near = &physics->near.counts;
   shown->model.capacity_dropped += near->dropped;
   shown->model.range_bodies = near->range_bodies;

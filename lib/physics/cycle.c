@@ -122,6 +122,7 @@ void hapi_physics_fill_settings(hapi_physics *physics)
 {
   hapi_settings *settings = &physics->cycle.settings;
   hapi_dial_fill(&physics->dial, physics->config.haptic_hz, settings);
+  settings->range_bodies = physics->room.bodies;
   hapi_dial_tell(&physics->dial, settings, &physics->counts.own.accuracy);
 }
 
@@ -140,6 +141,11 @@ static void sync_in(hapi_physics *physics)
   if (!hapi_tape_plays(physics->tape.tape)) {
     hapi_dial_follow(&physics->dial, &physics->cycle);
   }
+  if (!hapi_tape_plays(physics->tape.tape) && !physics->config.lockstep) {
+    hapi_room_time(&physics->room, &physics->cycle);
+  }
+  hapi_tape_pace(&physics->tape, &physics->room.pace, &physics->room.margin);
+  hapi_room_follow(&physics->room, &physics->cycle, physics->near.range.cut);
   hapi_dial_positions(&physics->dial, percent);
   hapi_tape_dials(&physics->tape, percent);
   hapi_dial_place(&physics->dial, percent);
@@ -242,6 +248,11 @@ static void cycle_tell(hapi_physics *physics, double seconds)
     hapi_say_once(cycle, &physics->said_late,
                   "physics takes longer than its period: the world is beyond real time; fewer "
                   "bodies, iterations or a lower physics_hz would help");
+  }
+  if (physics->room.cut_s > LATE_S) {
+    hapi_say_once(cycle, &physics->said_cut,
+                  "more bodies touch than a tick has time for: the range ends before them, and the "
+                  "force is approximate (hap_stats.room.range_most)");
   }
   if (cycle->state != NULL && cycle->state->unsolved >= UNSOLVED_TICKS) {
     hapi_say_once(cycle, &physics->said_unsolved,

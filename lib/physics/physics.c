@@ -153,6 +153,7 @@ static void physics_prepare(hapi_physics *physics)
   hapi_dial_reset(&physics->dial,
                   hapi_tape_dial_at_start(&physics->tape,
                                           hapi_dial_percent(atomic_load(&physics->dial.wanted))));
+  hapi_room_reset(&physics->room, &physics->config);
   hapi_physics_fill_settings(physics);
   hapi_probe_reset(&physics->probe);
   hapi_cross_reset(&physics->cross);

@@ -11,6 +11,7 @@
 #include "accuracy/dial.h"
 #include "accuracy/effects.h"
 #include "accuracy/lookback.h"
+#include "accuracy/room.h"
 #include "base/thread.h"
 #include "near/near.h"
 #include "physics/counts.h"
@@ -48,6 +49,7 @@ struct hapi_physics {
   hapi_cross cross;
   hapi_lookback lookback;
   hapi_dial dial;
+  hapi_room room;
   hapi_account account;
   hapi_feedback feedback;
   hapi_watch watch;
@@ -63,6 +65,7 @@ struct hapi_physics {
   bool said_late;
   bool said_unsolved;
   bool said_derated;
+  bool said_cut;
 };
 
 /* cycle.c: the collision phase, and testing simulations */

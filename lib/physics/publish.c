@@ -418,6 +418,8 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
   out->wishes = cycle->wishes;
   out->max_sweeps = cycle->settings.max_sweeps;
   out->row_updates = cycle->settings.row_updates;
+  out->tick_work =
+      hapi_room_work(physics->room.pace + physics->room.margin, physics->config.haptic_hz);
   out->sent_ns = hapi_tape_sent(&physics->tape, cycle);
   out->period_s = hapi_config_period(
       &physics->config, hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, true));

@@ -380,6 +380,15 @@ void hapi_tape_dials(hapi_taping *taping, int io_percent[2])
   }
 }
 
+void hapi_tape_pace(hapi_taping *taping, int *io_pace, int *io_margin)
+{
+  if (hapi_tape_plays(taping->tape) && taping->read->kind == HAPI_CELL_CYCLE) {
+    hapi_cell_pace(taping->read->u[HAPI_CYCLE_MISSED], io_pace, io_margin);
+  } else if (cycle_note(taping) != NULL) {
+    taping->note->u[HAPI_CYCLE_MISSED] |= hapi_pace_cell(*io_pace, *io_margin);
+  }
+}
+
 int hapi_tape_dial_at_start(hapi_taping *taping, int percent)
 {
   if (hapi_tape_plays(taping->tape)) {

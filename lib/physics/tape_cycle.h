@@ -53,6 +53,8 @@ uint32_t hapi_tape_wanted_effects(hapi_taping *taping, hapi_wanted *wanted);
 double hapi_tape_wanted_scale(hapi_taping *taping, hapi_wanted *wanted);
 /* Positions of both dials [percent]: to the recording, or from it. */
 void hapi_tape_dials(hapi_taping *taping, int io_percent[2]);
+/* Pace and margin of ticks, likewise: accuracy/room.h. */
+void hapi_tape_pace(hapi_taping *taping, int *io_pace, int *io_margin);
 /* The same of what both begin at. */
 int hapi_tape_dial_at_start(hapi_taping *taping, int percent);
 int64_t hapi_tape_sent(hapi_taping *taping, const hapi_cycle *cycle); /* hapi_model.sent_ns */

@@ -42,28 +42,30 @@ static double slot_exchanged_norm(const hapi_body_slot *slot)
   return hapi_v3_norm(slot->exchanged);
 }
 
-/* Those outside of the range that took most of the loop's impulse first. */
-static void edges_choose(hapi_probe *probe)
+static bool slot_is_edge(const hapi_probe *probe, uint32_t index)
 {
   const uint32_t role = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
-  for (uint32_t n = 0; n < probe->cycle->settings.edge_probes; ++n) {
-    uint32_t best = HAPI_NONE;
-    double best_norm = 0.0;
-    for (uint32_t i = 0; i < probe->slots->body_high; ++i) {
-      const hapi_body_slot *slot = &probe->slots->bodies[i];
-      bool outside = slot->phase == HAPI_SLOT_LIVE && slot->wanted &&
-                     (probe->answers.bodies[i].flags & role) == 0;
-      if (outside && slot_exchanged_norm(slot) > best_norm) {
-        best = i;
-        best_norm = slot_exchanged_norm(slot);
-      }
+  const hapi_body_slot *slot = &probe->slots->bodies[index];
+  return slot->phase == HAPI_SLOT_LIVE && slot->wanted &&
+         (probe->answers.bodies[index].flags & role) == 0 && slot_exchanged_norm(slot) > 0.0;
+}
+
+/* Bodies outside of the range that took impulse from the loop: all of them, or none. One that is
+ * measured carries the load that others with nothing but their mass give way to, and which one it
+ * is changes with the load: a pile flew apart. */
+static void edges_choose(hapi_probe *probe)
+{
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < probe->slots->body_high; ++i) {
+    count += slot_is_edge(probe, i);
+  }
+  for (uint32_t i = 0; i < probe->slots->body_high && count <= probe->cycle->settings.edge_probes;
+       ++i) {
+    hapi_body_answer *answer = &probe->answers.bodies[i];
+    if (slot_is_edge(probe, i)) {
+      answer->edge = true;
+      answer->flags = (answer->flags & ~(uint32_t)HAPI_BODY_RESTING) | HAPI_BODY_MEASURED;
     }
-    if (best == HAPI_NONE) {
-      return;
-    }
-    hapi_body_answer *answer = &probe->answers.bodies[best];
-    answer->edge = true;
-    answer->flags = (answer->flags & ~(uint32_t)HAPI_BODY_RESTING) | HAPI_BODY_MEASURED;
   }
 }
 

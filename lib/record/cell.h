@@ -13,6 +13,7 @@
 
 #include "base/assert.h"
 #include "base/hash.h"
+#include "base/pace.h"
 #include "base/pointer_setup.h"
 
 typedef enum hapi_stream {
@@ -89,6 +90,25 @@ static inline int hapi_cell_dial(uint64_t word, unsigned shift)
   HAPI_ASSERT(shift <= 56u);
   int percent = (int)(word >> shift & 0xffu) - 1;
   return percent < 0 || percent > 100 ? HAPI_DIAL_OF_NONE : percent;
+}
+
+/* Behind them the pace of ticks, + 64 in a byte, and their margin in another one; 0, of a recording
+ * without: the pace 0. */
+#define HAPI_PACE_SHIFT 48u
+#define HAPI_PACE_ZERO 64
+
+static inline uint64_t hapi_pace_cell(int pace, int margin)
+{
+  uint64_t low = (unsigned)(pace + HAPI_PACE_ZERO) & 0xffu;
+  return (low | (uint64_t)((unsigned)margin & 0xffu) << 8) << HAPI_PACE_SHIFT;
+}
+
+static inline void hapi_cell_pace(uint64_t word, int *out_pace, int *out_margin)
+{
+  int pace = (int)(word >> HAPI_PACE_SHIFT & 0xffu) - HAPI_PACE_ZERO;
+  int margin = (int)(word >> (HAPI_PACE_SHIFT + 8) & 0xffu);
+  *out_pace = pace < HAPI_PACE_LEAST || pace > HAPI_PACE_MOST ? 0 : pace;
+  *out_margin = margin > HAPI_MARGIN_MOST ? 0 : margin;
 }
 
 typedef enum hapi_cycled_word {

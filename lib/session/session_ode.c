@@ -98,6 +98,9 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
 #define TRIANGLES 2048u  /* near all pointers that are spheres */
 #define TOOL_POINTS 256u /* of all pointers that are hulls: a few dozen touches */
 
+/* At a low rate of physics a body in a pile is near thirty others, and touches eight. */
+#define PAIRS_PER_CONTACT 3u
+
 /* Slots for the range, as many again for what stands around it, and some for those that have left
  * and that the loop has not let go of. Geoms: a few a body. Joints: a chain has one a body, a truss
  * two. */
@@ -107,6 +110,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
   hapi_capacity capacity = {
       .bodies = 2 * (uint32_t)def->max_bodies + 16,
       .contacts = (uint32_t)def->max_contacts,
+      .pairs = PAIRS_PER_CONTACT * (uint32_t)def->max_contacts,
       .pointers = (uint32_t)def->max_pointers,
       .geoms = 8 * (uint32_t)def->max_bodies + 1024,
       .hull_points = (uint32_t)def->expert->max_hull_points,

@@ -374,6 +374,12 @@ static bool way_place(const hapi_solver *solver, sweep_way *out)
   return true;
 }
 
+static void updates_spend(hapi_solver *solver, uint64_t *io_left, uint64_t cost)
+{
+  solver->updates += cost;
+  *io_left -= cost < *io_left ? cost : *io_left;
+}
+
 /* In row updates. */
 static uint32_t way_cost(uint32_t rows)
 {
@@ -474,6 +480,7 @@ void hapi_solver_sweep_on(hapi_solver *solver)
 {
   for (uint32_t i = 0; i < 2 + CALM_UPDATES / solver->row_count; ++i) {
     solver->residual = rows_sweep(solver);
+    solver->updates += solver->row_count;
   }
   check_finite(solver);
 }
@@ -493,6 +500,7 @@ static void run_apart(hapi_solver *solver)
     row->impulse = hapi_clamp(old + wanted, row->lo, row->hi);
   }
   solver->sweeps = 1;
+  solver->updates = solver->row_count;
   solver->residual = 0.0;
   check_finite(solver);
 }
@@ -504,6 +512,7 @@ void hapi_solver_run(hapi_solver *solver)
   uint32_t rows = solver->row_count;
   uint64_t left = solver->update_budget;
   solver->sweeps = 0;
+  solver->updates = 0;
   solver->direct_solves = 0;
   solver->residual = 0.0;
   bool may = solver->direct_rows > 0;
@@ -522,7 +531,7 @@ void hapi_solver_run(hapi_solver *solver)
   for (uint32_t rounds = 0; rows > 0; ++rounds) {
     do {
       if (ahead && rounds > 0) {
-        left -= way_cost(rows) < left ? way_cost(rows) : left;
+        updates_spend(solver, &left, way_cost(rows));
         if (way.begun) {
           way_go_on(solver, &way);
         } else {
@@ -530,7 +539,7 @@ void hapi_solver_run(hapi_solver *solver)
         }
       }
       solver->residual = rows_sweep(solver);
-      left -= left < rows ? left : rows;
+      updates_spend(solver, &left, rows);
     } while (solver->sweeps < 2 && !(solver->residual < solver->tolerance));
     if (solver->residual < solver->tolerance || left < rows ||
         solver->sweeps == solver->max_sweeps) {
@@ -542,7 +551,7 @@ void hapi_solver_run(hapi_solver *solver)
     if (direct && 2 * left > solver->update_budget &&
         (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
       uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
-      left -= spent;
+      updates_spend(solver, &left, spent);
       way.begun = false;
       dearest = spent > dearest ? spent : dearest;
       direct = !solver->too_dear; /* now, and so in the next round */

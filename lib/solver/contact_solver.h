@@ -49,6 +49,7 @@ typedef struct hapi_solver {
   bool too_dear;      /* inner: an island was too large or too dear for the budget */
   double direct_residual; /* inner: the largest correction due after a direct run, m/s */
   uint32_t sweeps;        /* out */
+  uint64_t updates;       /* out: row updates, direct solves counted by their cost */
   uint32_t direct_solves; /* out: that were accepted */
   double residual;        /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
 } hapi_solver;

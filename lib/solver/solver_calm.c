@@ -86,6 +86,7 @@ static bool rays_measure(hapi_solver *solver, rays *r)
 {
   uint32_t count = solver->body_count <= HAPI_SOLVER_BODIES ? solver->body_count : 1;
   bool all_calm = true;
+  solver->updates += 2 * (uint64_t)solver->row_count; /* goes through them twice */
   velocities_rebuild(solver);
   memset(r->of, 0, count * sizeof r->of[0]);
   for (uint32_t i = 0; i < solver->row_count; ++i) {

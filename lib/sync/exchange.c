@@ -74,7 +74,7 @@ static const message_array arrays[] = {
 #define NEAR(...) ARRAY(HAPI_CHANNEL_NEAR, hapi_near, __VA_ARGS__)
     NEAR(bodies_offset, body_count, hapi_near_body, bodies),
     NEAR(geoms_offset, geom_count, hapi_near_geom, geoms),
-    NEAR(pairs_offset, pair_count, hapi_near_pair, contacts),
+    NEAR(pairs_offset, pair_count, hapi_near_pair, pairs),
     NEAR(points_offset, point_count, double[3], hull_points),
     NEAR(tools_offset, tool_count, hapi_near_tool, pointers),
     NEAR(tool_pairs_offset, tool_pair_count, hapi_near_tool_pair, contacts),

@@ -20,6 +20,7 @@
 typedef struct hapi_capacity {
   uint32_t bodies; /* slots: those of the range, and as many again around it */
   uint32_t contacts;
+  uint32_t pairs; /* of geoms that are near each other */
   uint32_t pointers;
   uint32_t geoms;        /* near the pointers */
   uint32_t hull_points;  /* of all hulls together */

@@ -61,6 +61,22 @@ typedef struct hapi_tick_load {
   double spent_ns;
 } hapi_tick_load;
 
+/* The work of a tick is counted in row updates of the solver: what it takes to make a row, and the
+ * least that a row costs, which is made and swept twice in each of two solves. */
+#define HAPI_ROW_MAKING 5u
+#define HAPI_ROW_WORK 9u
+
+/* Of ticks of model CONTACT. */
+typedef struct hapi_tick_work {
+  uint64_t ticks; /* this and the next three since the start */
+  uint64_t done;
+  double spent_ns;
+  uint64_t late;  /* ticks with much work that took most of their period */
+  uint32_t rows;  /* of the newest tick */
+  uint32_t owned; /* bodies of the loop in it */
+  uint32_t awake; /* those of them that do not rest, and so have rows */
+} hapi_tick_work;
+
 /* What a joint did to its bodies, for dJointFeedback. */
 typedef struct hapi_state_joint {
   uint32_t slot;
@@ -89,6 +105,7 @@ typedef struct hapi_state {
   double owned_impulse[3]; /* N s, what the loop's bodies got of it, and from bodies of ODE */
   hapi_tick_load load;
   bool derated;      /* since the start: some tick had less force because ticks came late */
+  hapi_tick_work work;
   uint32_t unsolved; /* since the start: ticks in a row, at most, that the solver did not solve */
   hap_model model;
   uint32_t body_high; /* slots 0 .. body_high - 1 are in the message */

@@ -67,6 +67,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   if (model->row_updates > 0) {
     solver->update_budget = model->row_updates;
   }
+  tick->rows.work.most = model->tick_work;
   bool observes = model_observes(&tick->pointers, model);
   if (observes && !facts->observes) {
     hapi_energy_resume(&tick->guard, &tick->pointers, facts->now_ns);

@@ -351,15 +351,22 @@ static __attribute__((noinline, cold)) void share_out(const hapi_rows *rows, uin
 static void rows_note_unsolved(hapi_rows *rows)
 {
   rows->unsolved = rows->solver.residual < HAPI_UNSOLVED ? 0 : rows->unsolved + 1;
+  rows->unsolved_all += rows->unsolved > 0;
   rows->unsolved_most = rows->unsolved > rows->unsolved_most ? rows->unsolved : rows->unsolved_most;
 }
 
 static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
 {
   hapi_solver *solver = &rows->solver;
+  hapi_work *work = &rows->work;
   uint64_t begin = hapi_effect_begin(sample);
+  uint32_t most = solver->update_budget;
+  uint64_t left = work->most > work->done ? work->most - work->done : 0;
+  solver->update_budget = work->most > 0 && left < most ? (uint32_t)left : most;
   hapi_solver_run(solver);
   hapi_solver_calm(solver);
+  solver->update_budget = most;
+  work->done += solver->updates;
   rows->residual_max =
       solver->residual > rows->residual_max ? solver->residual : rows->residual_max;
   rows->sweeps += solver->sweeps;
@@ -458,6 +465,7 @@ static void rows_make(hapi_tick *tick)
     hapi_effect_end(sample, HAP_EFFECT_CONTACTS, begin);
   }
   rows->solver.apart &= rows->solver.row_count == of_pointers;
+  rows->work.done = HAPI_ROW_MAKING * (uint64_t)rows->solver.row_count;
 }
 
 void hapi_contact_step(hapi_tick *tick)
@@ -484,6 +492,7 @@ void hapi_contact_step(hapi_tick *tick)
     bodies_take_velocities(&tick->bodies, &tick->rows, tick->facts.wishes);
   }
   rows_note_unsolved(&tick->rows);
+  tick->rows.work.all += tick->rows.work.done;
   hapi_pointer_forces(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->rows,
                       &tick->sample);
   if (pointers->proxies) {

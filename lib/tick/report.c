@@ -271,6 +271,19 @@ void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path)
   hapi_path_send(path, tick->facts.now_ns);
 }
 
+void hapi_tick_report_work(const hapi_tick *tick, hapi_tick_work *out)
+{
+  out->done = tick->rows.work.all;
+  out->rows = tick->rows.solver.row_count;
+  out->owned = out->awake = 0;
+  for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {
+    uint32_t flags = tick->bodies.of[tick->bodies.live[i]].flags;
+    bool owned = (flags & HAPI_BODY_OWNED) != 0;
+    out->owned += owned;
+    out->awake += owned && (flags & HAPI_BODY_RESTING) == 0;
+  }
+}
+
 void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out)
 {
   hapi_poses_body *bodies = hapi_poses_bodies(out);

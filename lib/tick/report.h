@@ -10,6 +10,8 @@
 #include "tick/tick.h"
 
 void hapi_tick_report(const hapi_tick *tick, hapi_state *out);
+/* Of the newest tick; ticks and spent_ns are the caller's. */
+void hapi_tick_report_work(const hapi_tick *tick, hapi_tick_work *out);
 void hapi_tick_report_poses(const hapi_tick *tick, hapi_poses *out);
 void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail);
 void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path);

@@ -86,6 +86,8 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->rows.residual_max = 0.0;
   tick->rows.sweeps = 0;
   tick->rows.unsolved = tick->rows.unsolved_most = 0;
+  tick->rows.unsolved_all = 0;
+  tick->rows.work = (hapi_work){.most = 0};
   solver->row_count = solver->body_count = 0;
   solver->dear_rows = solver->dear_runs = solver->vain_runs = 0;
   solver->ready = true; /* as the rows are made */

@@ -31,6 +31,7 @@ typedef struct hapi_settings {
   uint32_t max_sweeps;  /* 0: until the system is solved */
   uint32_t row_updates; /* the most, in a solve of a tick */
   int32_t range_hops;
+  uint32_t range_bodies; /* that the range may own: what a tick has time for */
   uint32_t edge_probes;
   double iterations; /* times those of the world; 0: fixed_iterations */
   int32_t fixed_iterations;
