@@ -133,6 +133,35 @@ static void arrival_compare(const faults_run *reference, const faults_run *test,
   io->error = fmax(fabs(found.peak / right.peak - 1.0), fabs(found.impulse / right.impulse - 1.0));
 }
 
+static void run_limit(const faults_scene *scene, faults_run *io)
+{
+  for (size_t i = 0; i < io->count; ++i) {
+    force_limit(&scene->motion, io->force[i]);
+  }
+}
+
+/* The same bodies with the same contacts have more than one solution: which one an iteration comes
+ * to, its order says, and how long it goes on. */
+static bool spread_measure(const faults_scene *scene, double rate, references *io)
+{
+  for (int i = 0; i < 2; ++i) {
+    faults_scene other = *scene;
+    faults_run run = {.count = 0};
+    comparison c;
+    other.turned = i == 0;
+    other.check.iterations *= 1 + i;
+    if (!faults_reference_run(&other, rate, &run)) {
+      faults_run_free(&run);
+      return false;
+    }
+    run_limit(scene, &run);
+    run_compare(scene, &io->half, &run, &c);
+    io->floor = fmax(io->floor, c.error);
+    faults_run_free(&run);
+  }
+  return true;
+}
+
 static bool references_make(bench *b, const faults_scene *scene, references *out)
 {
   memset(out, 0, sizeof *out);
@@ -145,15 +174,17 @@ static bool references_make(bench *b, const faults_scene *scene, references *out
     (void)bench_fail(b, HAP_ERROR_MEMORY, "no memory for the reference of %s", scene->name);
     return false;
   }
-  for (size_t i = 0; i < out->run.count; ++i) {
-    force_limit(&scene->motion, out->run.force[i]);
-    force_limit(&scene->motion, out->half.force[i]);
-  }
+  run_limit(scene, &out->run);
+  run_limit(scene, &out->half);
   comparison half;
   run_compare(scene, &out->half, &out->run, &half);
   run_compare(scene, &out->half, &out->half, &out->own);
   out->floor =
       scene->check.kind == FAULTS_FEEDBACK ? told_error(scene, &out->half, &out->run) : half.error;
+  if (scene->check.spreads && !spread_measure(scene, 2.0 * rate, out)) {
+    (void)bench_fail(b, HAP_ERROR_MEMORY, "no memory for the reference of %s", scene->name);
+    return false;
+  }
   return true;
 }
 

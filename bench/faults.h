@@ -108,6 +108,9 @@ typedef struct faults_check {
   double reference_hz; /* 0: 2 kHz */
   const char *model;   /* name of the session's; NULL: contact */
   int iterations;      /* of QuickStep in the reference; 0: dWorldStep */
+  /* statically indeterminate: the floor is also that of the other order of bodies, and of twice the
+   * iterations */
+  bool spreads;
 } faults_check;
 
 typedef struct faults_scene {
@@ -125,7 +128,8 @@ typedef struct faults_scene {
   /* Slow motion: share of the hand's time that passes for the bodies. Such a session is in drive
    * FRAME, in real time. 0: no slow motion, in drive LOCKSTEP */
   double slow;
-  bool alike; /* the session has the shapes of the reference: how exact the bench is */
+  bool turned; /* bodies are made in the other order: of a reference, for its floor */
+  bool alike;  /* the session has the shapes of the reference: how exact the bench is */
 } faults_scene;
 
 /* Forces on the hand at the begin of each tick. */

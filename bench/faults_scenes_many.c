@@ -78,7 +78,8 @@ static void pile_build(faults_world *w)
   dWorldSetQuickStepNumIterations(w->world, 100);
   for (int layer = 0; layer < 4 && layer < side; ++layer) {
     int width = side - layer;
-    for (int i = 0; i < width * width && (int)w->body_count < w->scene->count; ++i) {
+    for (int n = 0; n < width * width && (int)w->body_count < w->scene->count; ++n) {
+      int i = w->scene->turned ? width * width - 1 - n : n;
       int along = i / width;
       int across = i % width - side / 2;
       cube_add(w, PILE_MASS, PILE_EDGE, 0.5 * PILE_EDGE + pitch * (along + 0.5 * layer),
@@ -135,7 +136,8 @@ static const faults_scene many_table[] = {
     {13, "pile_1000", pile_build, PILE_FINGER, 1.0, JUDGED(FAULTS_DUTY_OWN, 1e9, .bound_20 = 0.1),
      .count = 1000},
     {14, "carpet", carpet_build, FINGER(&carpet_path), 0.5, WITHIN(0.03, .iterations = 100)},
-    {14, "pile_30", pile_build, PILE_FINGER, 0.5, WITHIN(0.03, .iterations = 200), .count = 30},
+    {14, "pile_30", pile_build, PILE_FINGER, 0.5, WITHIN(0.03, .iterations = 200, .spreads = true),
+     .count = 30},
     {14, "light_row", row_build, FINGER(&carpet_path), 0.5, WITHIN(0.01, .iterations = 200)},
     {15, "plate_64", pebbles_build, PLATE, 0.4, JUDGED(FAULTS_CAPACITY, 0.05), .count = 64},
     {15, "plate_256", pebbles_build, PLATE, 0.4, JUDGED(FAULTS_CAPACITY, 0.05), .count = 256},
