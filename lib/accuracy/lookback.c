@@ -463,6 +463,21 @@ static void window_note_touch(hapi_lookback *w, uint32_t most, const hapi_lookba
   t->noted = true;
 }
 
+/* Of what is moved by its pose nobody knows any more where it was. */
+static bool body_is_posed(const hapi_known_body *known)
+{
+  hap_twist rate;
+  hapi_extent_twist(known, &rate);
+  return known->posed && hapi_v3_norm(rate.linear) + hapi_v3_norm(rate.angular) > 0.0;
+}
+
+static bool slot_is_posed(const hapi_lookback *w, const hapi_contact_slot *slot)
+{
+  uint32_t known =
+      slot->body != HAPI_SLOT_NONE ? w->near->slots.bodies[slot->body].known : HAPI_NONE;
+  return known != HAPI_NONE && body_is_posed(&w->world->bodies.entries[known]);
+}
+
 void hapi_lookback_note(hapi_lookback *w)
 {
   if (w->phase != HAPI_LOOKBACK_OPEN) {
@@ -476,6 +491,7 @@ void hapi_lookback_note(hapi_lookback *w)
                                        .is_tool = slot->is_tool,
                                        .mu = slot->mu};
     if (slot->phase == HAPI_SLOT_LIVE) {
+      w->spoilt = w->spoilt || slot_is_posed(w, slot);
       window_note_touch(w, w->cycle->config->capacity.contacts, &touch);
     }
   }
@@ -577,7 +593,7 @@ static bool window_add_near(hapi_lookback *w)
     for (uint32_t k = 0; k < w->world->bodies.high && count <= BODIES_MAX && good; ++k) {
       const hapi_known_body *known = &w->world->bodies.entries[k];
       if (known->body != NULL && body_apart(w, known) < reach) {
-        good = ++count > BODIES_MAX || window_add_body(w, k);
+        good = !body_is_posed(known) && (++count > BODIES_MAX || window_add_body(w, k));
       }
     }
     if (!good || count <= BODIES_MAX) {

@@ -287,7 +287,7 @@ static void model_add_sphere(hapi_lookback *w, hapi_lookback_touch *t, uint32_t 
   double normal[3];
   double center[3];
   touch_place(t, p, center);
-  double reach = hapi_neighbors_reach(hapi_neighbors_speed(t->geom, p, center), period);
+  double reach = hapi_neighbors_reach(hapi_neighbors_speed(w->near, t->geom, p, center), period);
   if (!hapi_geom_nearest(w->near, t->geom, center, p->radius, reach, &at)) {
     t->placed = false;
     ++t->contact_generation;
@@ -328,8 +328,8 @@ static bool look_tool(const hapi_lookback *w, const hapi_lookback_touch *t,
 {
   const hapi_lookback_hand *hand = &w->hand;
   double spin = p->extent * hapi_v3_norm(p->twist.angular);
-  double speed = hapi_neighbors_speed(t->geom, p, p->pose.position) + spin +
-                 hapi_neighbors_spin(t->geom, p->extent);
+  double speed = hapi_neighbors_speed(w->near, t->geom, p, p->pose.position) + spin +
+                 hapi_neighbors_spin(w->near, t->geom, p->extent);
   const hapi_tool_at at = {.geom = t->geom,
                            .index = t->pointer,
                            .pointer = p,

@@ -109,6 +109,13 @@ static inline void hapi_body_point(const hapi_local_body *body, const double loc
   hapi_v3_add(out, body->pose.position, out);
 }
 
+/* Where a body is whose geom was part of the static world: of the newest model, at its begin. */
+static inline const hap_pose *hapi_body_frame_at_begin(const hapi_bodies *bodies, uint32_t slot)
+{
+  const hapi_model_course *course = &bodies->courses[slot].in;
+  return course->begins != 0 ? &course->before : &bodies->of[slot].pose;
+}
+
 /* From the world to the body's frame. */
 static inline void hapi_body_unpoint(const hapi_local_body *body, const double place[3],
                                      double out[3])

@@ -226,11 +226,17 @@ void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, int64_t now
     hapi_local_body *body = &bodies->of[in[i].slot];
     hapi_body_course *course = &bodies->courses[in[i].slot];
     hap_pose had = body->pose;
-    bool goes_on = was_driven(body, course, &in[i]);
+    const hapi_model_course *told =
+        in[i].course != 0 ? &hapi_model_courses(model)[in[i].course - 1] : NULL;
+    bool begins = told != NULL && told->begins != 0 && body->generation != in[i].generation;
+    const hap_pose *from = begins ? &told->before : was_driven(body, course, &in[i]) ? &had : NULL;
     adopt_body(body, model, &in[i], age_s, before);
+    body->shown.from = begins ? told->before : body->shown.from;
     course->known = false;
-    if (in[i].course != 0) {
-      hapi_course_adopt(course, model, &in[i], goes_on ? &had : NULL, now_ns, body);
+    course->in.begins = begins ? 1 : 0;
+    course->in.before = begins ? told->before : course->in.before;
+    if (told != NULL && model->model == HAP_MODEL_CONTACT) {
+      hapi_course_adopt(course, model, &in[i], from, now_ns, body);
     }
     bodies->live[i] = in[i].slot;
     if (in[i].slot >= bodies->high) {

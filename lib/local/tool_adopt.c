@@ -161,8 +161,8 @@ static void link_to_pair(hapi_tool_world *w, uint32_t at)
 }
 
 /* old: with what of it goes on; HAPI_SLOT_NONE: a new one. */
-static void tool_add(hapi_touches *touches, const hapi_tool_point *in, uint32_t old,
-                     uint32_t wishes)
+static void tool_add(hapi_touches *touches, const hapi_bodies *bodies, const hapi_tool_point *in,
+                     uint32_t old, uint32_t wishes)
 {
   hapi_tool_world *w = &touches->tool;
   uint32_t at = w->count;
@@ -176,6 +176,10 @@ static void tool_add(hapi_touches *touches, const hapi_tool_point *in, uint32_t 
     tool->member = w->old_tools[old].member;
     tool->friction = w->old_tools[old].friction;
     w->old_tools[old].heir = HAPI_SLOT_NONE;
+    if (c->body == HAPI_SLOT_NONE && in->at.body_b != HAPI_SLOT_NONE) {
+      hapi_friction_hand_over(hapi_body_frame_at_begin(bodies, in->at.body_b), &tool->friction);
+      w->pairs[pair].placed = false;
+    }
   } else {
     memset(c, 0, sizeof *c);
     tool->member = w->pairs[pair].depth > 0.0 ? 0.0 : 1.0;
@@ -198,7 +202,8 @@ static void tool_add(hapi_touches *touches, const hapi_tool_point *in, uint32_t 
 }
 
 /* What was not found again. */
-static void tools_keep_leaving(hapi_touches *touches, uint32_t old_count, uint32_t wishes)
+static void tools_keep_leaving(hapi_touches *touches, const hapi_bodies *bodies, uint32_t old_count,
+                               uint32_t wishes)
 {
   hapi_tool_world *w = &touches->tool;
   for (uint32_t i = 0; i < old_count; ++i) {
@@ -208,7 +213,7 @@ static void tools_keep_leaving(hapi_touches *touches, uint32_t old_count, uint32
       continue;
     }
     uint32_t at = w->count;
-    tool_add(touches, &old.in, i, wishes);
+    tool_add(touches, bodies, &old.in, i, wishes);
     w->tools[at].leaving = true;
   }
 }
@@ -245,9 +250,10 @@ static uint32_t tools_begin(hapi_tool_world *w)
   return old_count;
 }
 
-static void tools_end(hapi_touches *touches, uint32_t old_count, uint32_t wishes)
+static void tools_end(hapi_touches *touches, const hapi_bodies *bodies, uint32_t old_count,
+                      uint32_t wishes)
 {
-  tools_keep_leaving(touches, old_count, wishes);
+  tools_keep_leaving(touches, bodies, old_count, wishes);
   drop_pairs(&touches->tool);
   regroup_leaving(&touches->tool);
   link_groups(&touches->tool);
@@ -272,7 +278,8 @@ static void tools_put_back(hapi_touches *touches)
   }
 }
 
-void hapi_tool_adopt_model(hapi_touches *touches, const hapi_pointers *pointers, hapi_model *model)
+void hapi_tool_adopt_model(hapi_touches *touches, const hapi_pointers *pointers,
+                           const hapi_bodies *bodies, hapi_model *model)
 {
   const hapi_model_contact *contacts = hapi_model_contacts(model);
   const hapi_tool_point *tools = hapi_model_tools(model);
@@ -294,17 +301,17 @@ void hapi_tool_adopt_model(hapi_touches *touches, const hapi_pointers *pointers,
       continue;
     }
     hapi_local_contact *c = &touches->of[touches->count]; /* where it comes to be */
-    tool_add(touches, in, old_of(&touches->tool, old_count, in, i), model->wishes);
+    tool_add(touches, bodies, in, old_of(&touches->tool, old_count, in, i), model->wishes);
     c->slot = contacts[i].slot;
     c->generation = contacts[i].generation;
     memcpy(c->response.a, contacts[i].a, sizeof c->response.a);
     memcpy(c->response.turn, contacts[i].turn, sizeof c->response.turn);
   }
-  tools_end(touches, old_count, model->wishes);
+  tools_end(touches, bodies, old_count, model->wishes);
 }
 
 void hapi_tool_adopt_patches(hapi_touches *touches, const hapi_pointers *pointers,
-                             hapi_patches *patches, uint32_t wishes)
+                             const hapi_bodies *bodies, hapi_patches *patches, uint32_t wishes)
 {
   const hapi_tool_point *tools = hapi_patches_tools(patches);
   if (patches->tool_count == 0 && touches->tool.count == 0) {
@@ -319,8 +326,8 @@ void hapi_tool_adopt_patches(hapi_touches *touches, const hapi_pointers *pointer
   }
   for (uint32_t i = 0; i < patches->tool_count; ++i) {
     if (is_there(&touches->tool, pointers, &tools[i])) {
-      tool_add(touches, &tools[i], old_of(&touches->tool, old_count, &tools[i], i), wishes);
+      tool_add(touches, bodies, &tools[i], old_of(&touches->tool, old_count, &tools[i], i), wishes);
     }
   }
-  tools_end(touches, old_count, wishes);
+  tools_end(touches, bodies, old_count, wishes);
 }

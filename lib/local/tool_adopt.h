@@ -5,6 +5,7 @@
 
 /* The contacts of hulls, of a new model or new patches. */
 
+#include "local/body.h"
 #include "local/touch.h"
 #include "pointer/pointer.h"
 
@@ -12,10 +13,11 @@
 void hapi_tool_set_aside(hapi_touches *touches);
 
 /* After them. */
-void hapi_tool_adopt_model(hapi_touches *touches, const hapi_pointers *pointers, hapi_model *model);
+void hapi_tool_adopt_model(hapi_touches *touches, const hapi_pointers *pointers,
+                           const hapi_bodies *bodies, hapi_model *model);
 
 /* Model CONTACT. */
 void hapi_tool_adopt_patches(hapi_touches *touches, const hapi_pointers *pointers,
-                             hapi_patches *patches, uint32_t wishes);
+                             const hapi_bodies *bodies, hapi_patches *patches, uint32_t wishes);
 
 #endif

@@ -216,6 +216,7 @@ static void follow_side(const hapi_tool_world *w, hapi_tool_pair *pair,
   pair->sided = hapi_v3_dot(way, way) > 0.0 && pair->found > pair->leapt;
   if (pair->sided) {
     pair->side = (hapi_tool_side){.key = pair->key, .pointer = pair->pointer};
+    pair->side.body = contacts[pair->first].body;
     pair->side.epoch = body != NULL ? body->epoch : 0;
     pair->side.place = at;
     hapi_v3_copy(way, pair->side.way);

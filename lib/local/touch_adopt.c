@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/pose.h"
 #include "local/tool_adopt.h"
 
 static uint32_t epoch_of(const hapi_bodies *bodies, uint32_t slot)
@@ -18,10 +19,18 @@ static void touches_keep(const hapi_touches *touches)
     const hapi_local_contact *c = &touches->of[i];
     HAPI_ASSERT(c->tool == 0);
     touches->kept[c->slot] = (hapi_kept_touch){.generation = c->seen ? c->generation : 0,
+                                               .body = c->body,
                                                .epoch = c->epoch,
                                                .ramp = c->ramp,
                                                .ball = c->ball};
   }
+}
+
+static void ball_hand_over(const hap_pose *frame, hapi_constrained_ball *io)
+{
+  hapi_pose_unpoint(frame->position, frame->quat_wxyz, io->ball, io->ball);
+  hapi_pose_unpoint(frame->position, frame->quat_wxyz, io->center, io->center);
+  hapi_quat_unrotate(frame->quat_wxyz, io->normal, io->normal);
 }
 
 static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
@@ -53,6 +62,11 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
     out->ramp = kept->ramp;
     out->ball = kept->ball;
     out->ball.known &= kept->epoch == out->epoch; /* else the body was put elsewhere */
+    if (kept->body == HAPI_SLOT_NONE && in->body != HAPI_SLOT_NONE) {
+      const hap_pose *frame = hapi_body_frame_at_begin(bodies, in->body);
+      ball_hand_over(frame, &out->ball);
+      hapi_friction_hand_over(frame, &touches->frictions[in->slot]);
+    }
   }
 }
 
@@ -95,5 +109,5 @@ void hapi_touches_adopt(hapi_touches *touches, const hapi_pointers *pointers,
       contact_adopt(touches, bodies, &in[i], model->wishes, &touches->of[touches->count++]);
     }
   }
-  hapi_tool_adopt_model(touches, pointers, model);
+  hapi_tool_adopt_model(touches, pointers, bodies, model);
 }

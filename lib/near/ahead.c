@@ -56,15 +56,22 @@ static bool body_is_done(const hapi_nearby *nearby, uint32_t known)
 static bool body_may_come(const hapi_nearby *nearby, uint32_t known)
 {
   dBodyID body = known_body(nearby, known)->body;
-  return body != NULL && !dBodyIsKinematic(body) && dBodyIsEnabled(body) &&
-         !body_is_done(nearby, known);
+  return body != NULL && dBodyIsEnabled(body) && !body_is_done(nearby, known);
+}
+
+/* The loop needs nothing but its number, and learns how it goes. */
+static bool body_is_driven(const hapi_nearby *nearby, uint32_t known)
+{
+  return dBodyIsKinematic(known_body(nearby, known)->body) != 0;
 }
 
 /* s: when the body may touch a pointer, with its velocity and any acceleration of that size. */
 static double body_arrival(const hapi_nearby *nearby, const hapi_known_body *known)
 {
   const hapi_state_pointer *pointers = hapi_state_pointers(nearby->cycle->state);
-  double spin = known->extent * hapi_v3_norm(dBodyGetAngularVel(known->body));
+  hap_twist twist;
+  hapi_extent_twist(known, &twist);
+  double spin = known->extent * hapi_v3_norm(twist.angular);
   double soonest = HUGE_VAL;
   for (uint32_t i = 0; i < nearby->cycle->state->pointer_count; ++i) {
     double way[3];
@@ -74,7 +81,7 @@ static double body_arrival(const hapi_nearby *nearby, const hapi_known_body *kno
     }
     double size = pointers[i].is_tool != 0 ? pointers[i].extent : pointers[i].radius;
     hapi_v3_sub(dBodyGetPosition(known->body), pointers[i].pose.position, way);
-    hapi_v3_sub(dBodyGetLinearVel(known->body), pointers[i].twist.linear, closing);
+    hapi_v3_sub(twist.linear, pointers[i].twist.linear, closing);
     double distance = fmax(hapi_v3_norm(way) - known->extent - size - LOOK_FLOOR, 0.0);
     double speed = hapi_v3_norm(closing) + spin;
     double a = LOOK_ACCELERATION;
@@ -104,14 +111,14 @@ static void comers_collect(hapi_nearby *nearby)
     double arrival_s = body_arrival(nearby, known);
     if (arrival_s <= (known->loop_owned ? LOOK_KEEPS : 1.0) * LOOK_AHEAD_S) {
       comer_add(nearby, i, arrival_s);
-    } else if (known->loop_owned && known->jointed) {
+    } else if (known->loop_owned && known->jointed && !body_is_driven(nearby, i)) {
       comer_add(nearby, i, HUGE_VAL); /* until it rests */
     }
   }
   const hapi_joint_table *joints = &nearby->world->joints;
   for (uint32_t i = 0; i < joints->count; ++i) {
     uint32_t known = joints->entries[i].index[0];
-    if (known != HAPI_NONE && body_may_come(nearby, known) &&
+    if (known != HAPI_NONE && body_may_come(nearby, known) && !body_is_driven(nearby, known) &&
         dJointIsEnabled(joints->entries[i].joint) &&
         hapi_joint_open(&joints->entries[i]) > OPEN_MOST) {
       comer_add(nearby, known, HUGE_VAL);
@@ -177,7 +184,7 @@ static bool island_add_links(hapi_nearby *nearby, uint32_t known, hapi_range_nee
     return false;
   }
   for (uint32_t i = 0; i < range->links.count; ++i) {
-    dBodyID body = dGeomGetBody(range->links.list[i].other);
+    dBodyID body = hapi_geom_body(nearby->world, range->links.list[i].other);
     bool has_end = body == NULL || dBodyIsKinematic(body);
     ahead->half_pairs += has_end ? 2 : 1; /* others are met from both sides */
     if (has_end) {
@@ -249,8 +256,12 @@ static void ahead_walk(hapi_nearby *nearby)
   range->hops = 0;
   for (uint32_t i = 0; i < ahead->count; ++i) {
     uint32_t known = ahead->comers[i].known;
-    if (!body_is_done(nearby, known) && island_fits(nearby, known) &&
-        !hapi_range_follow(nearby, known)) {
+    if (body_is_done(nearby, known)) {
+      continue;
+    }
+    bool fits = body_is_driven(nearby, known) ? range->count < nearby->cycle->config->max_bodies
+                                              : island_fits(nearby, known);
+    if (fits && !hapi_range_follow(nearby, known)) {
       return;
     }
   }

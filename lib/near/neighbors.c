@@ -140,22 +140,41 @@ void hapi_neighbors_collect(hapi_nearby *nearby)
   }
 }
 
-double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer, const double point[3])
+/* Of a geom's body; false: it has none that is known. */
+static bool geom_twist(const hapi_nearby *nearby, dGeomID geom, dBodyID *out_body, hap_twist *out)
 {
-  dVector3 velocity = {0.0, 0.0, 0.0, 0.0};
-  dBodyID body = dGeomGetBody(geom);
-  if (body != NULL) {
-    dBodyGetPointVel(body, point[0], point[1], point[2], velocity);
+  *out_body = hapi_geom_body(nearby->world, geom);
+  uint32_t known = hapi_bodies_find(&nearby->world->bodies, *out_body);
+  if (known != HAPI_NONE) {
+    hapi_extent_twist(&nearby->world->bodies.entries[known], out);
+  } else if (*out_body != NULL) {
+    hapi_twist_read(*out_body, out);
+  }
+  return *out_body != NULL;
+}
+
+double hapi_neighbors_speed(const hapi_nearby *nearby, dGeomID geom,
+                            const hapi_state_pointer *pointer, const double point[3])
+{
+  double velocity[3] = {0.0, 0.0, 0.0};
+  dBodyID body;
+  hap_twist twist;
+  if (geom_twist(nearby, geom, &body, &twist)) {
+    double arm[3];
+    hapi_v3_sub(point, dBodyGetPosition(body), arm);
+    hapi_v3_cross(twist.angular, arm, velocity);
+    hapi_v3_add(velocity, twist.linear, velocity);
   }
   double difference[3];
   hapi_v3_sub(pointer->twist.linear, velocity, difference);
   return hapi_v3_norm(difference);
 }
 
-double hapi_neighbors_spin(dGeomID geom, double distance)
+double hapi_neighbors_spin(const hapi_nearby *nearby, dGeomID geom, double distance)
 {
-  dBodyID body = dGeomGetBody(geom);
-  return body != NULL ? distance * hapi_v3_norm(dBodyGetAngularVel(body)) : 0.0;
+  dBodyID body;
+  hap_twist twist;
+  return geom_twist(nearby, geom, &body, &twist) ? distance * hapi_v3_norm(twist.angular) : 0.0;
 }
 
 /* A search about a geom: from where a pointer would be if it could not enter it. */
@@ -229,7 +248,7 @@ static bool nearest_of_side(hapi_nearby *nearby, const hapi_candidate *candidate
   double way[3];
   side_search s = {.nearby = nearby,
                    .geom = candidate->geom,
-                   .body = dGeomGetBody(candidate->geom),
+                   .body = hapi_geom_body(nearby->world, candidate->geom),
                    .radius = radius,
                    .mesh = dGeomGetClass(candidate->geom) == dTriMeshClass};
   hapi_v3_copy(slot->last_touch.ball, ball.ball);
@@ -267,7 +286,7 @@ static bool nearest_of_side(hapi_nearby *nearby, const hapi_candidate *candidate
 static const hapi_contact_slot *touch_of(hapi_nearby *nearby, const hapi_candidate *candidate,
                                          const hapi_state_pointer *pointer)
 {
-  dBodyID body = dGeomGetBody(candidate->geom);
+  dBodyID body = hapi_geom_body(nearby->world, candidate->geom);
   uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
   uint32_t of = known != HAPI_NONE ? nearby->world->bodies.entries[known].slot : HAPI_SLOT_NONE;
   if (body != NULL && of == HAPI_NONE) {
@@ -299,9 +318,10 @@ static bool find_nearest(hapi_nearby *nearby, const hapi_candidate *candidate, h
     found = hapi_geom_nearest(nearby, candidate->geom, pointer->pose.position, radius,
                               candidate->reach, out);
   }
-  return found && out->distance <=
-                      hapi_neighbors_reach(
-                          hapi_neighbors_speed(candidate->geom, pointer, out->point_b), horizon);
+  return found &&
+         out->distance <=
+             hapi_neighbors_reach(
+                 hapi_neighbors_speed(nearby, candidate->geom, pointer, out->point_b), horizon);
 }
 
 static bool find_hit(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *out)
@@ -347,7 +367,7 @@ static double hit_friction(hapi_nearby *nearby, const hapi_hit *hit,
 static void place_contact(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_hit *hit,
                           const hapi_state_pointer *pointer)
 {
-  dBodyID body = dGeomGetBody(hit->geom);
+  dBodyID body = hapi_geom_body(nearby->world, hit->geom);
   double normal[3];
   hapi_v3_copy(hit->nearest.point_b, slot->point_body);
   HAPI_ASSERT_UNIT(hit->nearest.normal);
@@ -377,7 +397,7 @@ static void place_contact(hapi_nearby *nearby, hapi_contact_slot *slot, const ha
   if (relief && (wish == HAP_EFFECT_ON ||
                  (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_CALLED))) {
     double step = nearby->cycle->probe_step_s;
-    double speed = hapi_neighbors_speed(hit->geom, pointer, pointer->pose.position);
+    double speed = hapi_neighbors_speed(nearby, hit->geom, pointer, pointer->pose.position);
     hapi_relief_note(nearby, hit->geom, pointer,
                      pointer->radius + hapi_neighbors_reach(speed, 2.0 * step),
                      pointer->radius + REACH_FLOOR + speed * step, slot);
@@ -393,14 +413,14 @@ static void place_contact(hapi_nearby *nearby, hapi_contact_slot *slot, const ha
   slot->hidden = hit->hidden;
   slot->last_touch.epoch =
       slot->body != HAPI_SLOT_NONE ? nearby->slots.bodies[slot->body].epoch : 0;
-  slot->speed = hapi_neighbors_speed(hit->geom, pointer, hit->nearest.point_b);
+  slot->speed = hapi_neighbors_speed(nearby, hit->geom, pointer, hit->nearest.point_b);
   slot->stiffness = pointer->stiffness;
   slot->finger_radius = pointer->finger_radius;
 }
 
 static uint32_t body_of_hit(const hapi_nearby *nearby, const hapi_hit *hit)
 {
-  return hapi_bodies_find(&nearby->world->bodies, dGeomGetBody(hit->geom));
+  return hapi_bodies_find(&nearby->world->bodies, hapi_geom_body(nearby->world, hit->geom));
 }
 
 /* What is only near finds its place when it is touched: farther ones lose theirs then. */
@@ -422,7 +442,7 @@ static uint32_t choose_hits(hapi_nearby *nearby, uint32_t count)
   uint32_t chosen = 0;
   uint32_t contacts = 0;
   for (uint32_t i = 0; i < count; ++i) {
-    bool has_body = dGeomGetBody(hits[i].geom) != NULL;
+    bool has_body = hapi_geom_body(nearby->world, hits[i].geom) != NULL;
     uint32_t index = body_of_hit(nearby, &hits[i]);
     bool known = index != HAPI_NONE;
     bool counted = known && hapi_nearby_chose(nearby, index, nearby->cycle->model_number + 1);
@@ -473,7 +493,7 @@ static void take_body(hapi_body_slot *local, dBodyID body)
 
 static void take_hit(hapi_nearby *nearby, hapi_hit *hit)
 {
-  dBodyID body = dGeomGetBody(hit->geom);
+  dBodyID body = hapi_geom_body(nearby->world, hit->geom);
   const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer];
   uint32_t slot = body != NULL ? hapi_slots_body(nearby, body_of_hit(nearby, hit)) : HAPI_SLOT_NONE;
   hapi_contact_slot *contact = NULL;
@@ -582,6 +602,7 @@ void hapi_neighbors_find(hapi_nearby *nearby)
   nearby->tools.count = 0;
   hapi_relief_begin(nearby);
   hapi_slots_begin_model(nearby);
+  hapi_slots_hand_over(nearby);
   if (!hapi_nearby_reserve_visits(nearby)) {
     hood->candidate_count = 0; /* what cannot be noted is not near */
   }

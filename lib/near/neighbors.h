@@ -58,11 +58,12 @@ bool hapi_neighbors_create(hapi_nearby *nearby);
 void hapi_neighbors_finish(hapi_nearby *nearby);
 void hapi_neighbors_collect(hapi_nearby *nearby); /* before the global step */
 void hapi_neighbors_find(hapi_nearby *nearby);    /* after it: bodies and contacts of the model */
-double hapi_neighbors_speed(dGeomID geom, const hapi_state_pointer *pointer,
+double hapi_neighbors_speed(const hapi_nearby *nearby, dGeomID geom,
+                            const hapi_state_pointer *pointer,
                             const double point[3]);                   /* m/s, relative */
 double hapi_neighbors_reach(double relative_speed, double horizon_s); /* m */
 /* m/s, at a distance from the centre of the geom's body, by its turning */
-double hapi_neighbors_spin(dGeomID geom, double distance);
+double hapi_neighbors_spin(const hapi_nearby *nearby, dGeomID geom, double distance);
 /* Dynamic bodies that a pointer may touch, of the newest model. */
 uint32_t hapi_neighbors_bodies(const hapi_nearby *nearby);
 

@@ -94,7 +94,7 @@ static bool fill_hull(hapi_nearby *nearby, dGeomID geom, hapi_near *near, hapi_n
       near->point_count + hull.hull_count > nearby->cycle->config->capacity.hull_points) {
     return false;
   }
-  dBodyID body = dGeomGetBody(geom);
+  dBodyID body = hapi_geom_body(nearby->world, geom);
   out->hull_first = near->point_count;
   for (size_t i = 0; i < hull.hull_count; ++i) {
     double *to = hapi_near_points(near) + (size_t)3 * near->point_count++;
@@ -114,7 +114,7 @@ static bool fill_hull(hapi_nearby *nearby, dGeomID geom, hapi_near *near, hapi_n
 static bool fill_geom(hapi_nearby *nearby, dGeomID geom, hapi_near_geom *out)
 {
   hapi_near *near = nearby->range.near;
-  dBodyID body = dGeomGetBody(geom);
+  dBodyID body = hapi_geom_body(nearby->world, geom);
   memset(out, 0, sizeof *out);
   fill_static(out);
   if (dGeomGetClass(geom) == dConvexClass) {
@@ -374,7 +374,7 @@ static void add_meeting(hapi_nearby *nearby, const hapi_link *link, const link_p
 static void add_parts(hapi_nearby *nearby, const hapi_link *link)
 {
   link_parts parts;
-  dBodyID other = dGeomGetBody(link->other);
+  dBodyID other = hapi_geom_body(nearby->world, link->other);
   parts_find(nearby, link, &parts);
   if (!parts.all || parts.pairs == 0) {
     return;
@@ -447,7 +447,7 @@ static void add_tool_pair(hapi_nearby *nearby, const hapi_hit *hit, uint32_t geo
 static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
 {
   const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer];
-  dBodyID body = dGeomGetBody(hit->geom);
+  dBodyID body = hapi_geom_body(nearby->world, hit->geom);
   double speed =
       hapi_v3_norm(pointer->twist.linear) + pointer->extent * hapi_v3_norm(pointer->twist.angular);
   const hapi_tool_box box = {
@@ -469,7 +469,7 @@ static void take_tools(hapi_nearby *nearby, uint32_t hit_count)
 {
   for (uint32_t i = 0; i < hit_count; ++i) {
     const hapi_hit *hit = &nearby->neighbors.hits[i];
-    dBodyID body = dGeomGetBody(hit->geom);
+    dBodyID body = hapi_geom_body(nearby->world, hit->geom);
     uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
     if (hit->tool_count == 0 ||
         (body != NULL && (known == HAPI_NONE || known_body(nearby, known)->slot == HAPI_NONE))) {
@@ -539,8 +539,10 @@ static double surface_speed(const hapi_nearby *nearby, dBodyID body)
   if (known == HAPI_NONE) {
     return 0.0;
   }
-  return hapi_v3_norm(dBodyGetLinearVel(body)) +
-         nearby->world->bodies.entries[known].extent * hapi_v3_norm(dBodyGetAngularVel(body));
+  const hapi_known_body *of = known_body(nearby, known);
+  hap_twist twist;
+  hapi_extent_twist(of, &twist);
+  return hapi_v3_norm(twist.linear) + of->extent * hapi_v3_norm(twist.angular);
 }
 
 /* How far two surfaces may come nearer until the model after the next. */
@@ -571,7 +573,7 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
     dSpaceCollide2(range->links.box_geom, geom, data, link_geom);
     return;
   }
-  dBodyID body = dGeomGetBody(geom);
+  dBodyID body = hapi_geom_body(nearby->world, geom);
   double reach = link_reach(nearby, range->links.own_speed + surface_speed(nearby, body));
   if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass || body == range->links.own_body ||
       !bits_meet(range->links.own_geom, geom) ||
@@ -673,7 +675,7 @@ bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_
   }
   for (uint32_t i = 0; i < range->links.count; ++i) {
     dGeomID other = range->links.list[i].other;
-    if (!geom_is_known(other) || !body_is_known(nearby, dGeomGetBody(other)) ||
+    if (!geom_is_known(other) || !body_is_known(nearby, hapi_geom_body(nearby->world, other)) ||
         meshes_move(nearby, &range->links.list[i])) {
       return false;
     }
@@ -713,7 +715,7 @@ static void take_links(hapi_nearby *nearby)
   hapi_range *range = &nearby->range;
   for (uint32_t i = 0; i < range->links.count; ++i) {
     const hapi_link *link = &range->links.list[i];
-    dBodyID body = dGeomGetBody(link->other);
+    dBodyID body = hapi_geom_body(nearby->world, link->other);
     uint64_t key = meeting_key(link->own, link->other);
     bool found = false;
     hapi_pair_place *place = pair_place(range, key, &found);
@@ -879,8 +881,8 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
   }
   hapi_cover_begin(&range->links.cover);
   for (uint32_t i = 0; i < hit_count; ++i) { /* nearest first */
-    uint32_t known =
-        hapi_bodies_find(&nearby->world->bodies, dGeomGetBody(nearby->neighbors.hits[i].geom));
+    uint32_t known = hapi_bodies_find(
+        &nearby->world->bodies, hapi_geom_body(nearby->world, nearby->neighbors.hits[i].geom));
     if (known != HAPI_NONE && known_body(nearby, known)->slot != HAPI_NONE) {
       range_enqueue(nearby, known);
     }

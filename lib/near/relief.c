@@ -66,7 +66,7 @@ void hapi_relief_note(hapi_nearby *nearby, dGeomID geom, const hapi_state_pointe
   hapi_relief *relief = &nearby->neighbors.relief;
   hapi_told *told = &relief->told[slot - nearby->slots.contacts];
   const double *at = pointer->pose.position;
-  dBodyID body = dGeomGetBody(geom);
+  dBodyID body = hapi_geom_body(nearby->world, geom);
   told->first = relief->count;
   told->count = relief_find(nearby, geom, at, pointer->radius + SLACK_LEAST, &within);
   if (within < least) {

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/pose.h"
 #include "near/near.h"
 
 /* Small numbers for what the loop carries. A body's slot is used again only after the loop has
@@ -127,6 +128,32 @@ static void slot_retire(hapi_nearby *nearby, hapi_body_slot *slot)
   slot->retired_at = nearby->cycle->model_number + 1;
   if (slot->known != HAPI_NONE) {
     nearby->world->bodies.entries[slot->known].slot = HAPI_NONE;
+  }
+}
+
+/* The static world's frame is that of the world. */
+static void touch_hand_over(const hapi_known_body *carrier, hapi_last_touch *io)
+{
+  const hap_pose *at = &carrier->rest->way.before;
+  hapi_pose_unpoint(at->position, at->quat_wxyz, io->ball, io->ball);
+  hapi_quat_unrotate(at->quat_wxyz, io->normal, io->normal);
+}
+
+void hapi_slots_hand_over(hapi_nearby *nearby)
+{
+  const hapi_world *world = nearby->world;
+  for (uint32_t i = 0; world->carriers.count > 0 && i < nearby->slots.contact_high; ++i) {
+    hapi_contact_slot *slot = &nearby->slots.contacts[i];
+    if (slot->phase != HAPI_SLOT_LIVE || slot->body != HAPI_SLOT_NONE) {
+      continue;
+    }
+    dBodyID carrier = hapi_carrier_of(&world->carriers, slot->geom);
+    uint32_t known = hapi_bodies_find(&world->bodies, carrier);
+    uint32_t body = known != HAPI_NONE ? hapi_slots_body(nearby, known) : HAPI_NONE;
+    if (body != HAPI_NONE) {
+      slot->body = body;
+      touch_hand_over(&world->bodies.entries[known], &slot->last_touch);
+    }
   }
 }
 

@@ -97,8 +97,10 @@ hapi_contact_slot *hapi_slots_contact(hapi_nearby *nearby, uint32_t body, dGeomI
 hapi_contact_slot *hapi_slots_new_contact(hapi_nearby *nearby, uint32_t body, dGeomID geom,
                                           uint32_t pointer, uint32_t pointer_generation);
 void hapi_slots_begin_model(hapi_nearby *nearby); /* nothing wanted yet */
-void hapi_slots_end_model(hapi_nearby *nearby);   /* what is not wanted retires */
-void hapi_slots_release(hapi_nearby *nearby);     /* retired ones the loop is done with */
+/* What touched geoms that have got a carrier since goes on as contacts of that. */
+void hapi_slots_hand_over(hapi_nearby *nearby);
+void hapi_slots_end_model(hapi_nearby *nearby); /* what is not wanted retires */
+void hapi_slots_release(hapi_nearby *nearby);   /* retired ones the loop is done with */
 void hapi_slots_drop_body(hapi_nearby *nearby, uint32_t known); /* the body is gone */
 void hapi_slots_restart(hapi_body_slot *slot); /* the loop starts again from ODE's state */
 void hapi_slots_renew(hapi_body_slot *slot);   /* and forgets what it summed up, too */

@@ -191,7 +191,7 @@ uint32_t hapi_tool_triangles(hapi_nearby *nearby, const hapi_tool_box *in, uint6
 {
   double way[3] = {0.0, 0.0, 0.0};
   double reach = in->reach;
-  dBodyID body = dGeomGetBody(in->geom);
+  dBodyID body = hapi_geom_body(nearby->world, in->geom);
   if (in->side != NULL) {
     hapi_v3_copy(in->side->way, way);
   }
@@ -236,9 +236,10 @@ static void search_reduce(tool_search *s)
 
 uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer)
 {
-  uint32_t known = hapi_bodies_find(&nearby->world->bodies, dGeomGetBody(geom));
+  uint32_t known = hapi_bodies_find(&nearby->world->bodies, hapi_geom_body(nearby->world, geom));
   uint32_t slot = known != HAPI_NONE ? nearby->world->bodies.entries[known].slot : HAPI_NONE;
-  uint64_t holder = slot != HAPI_NONE ? nearby->slots.bodies[slot].generation : 0;
+  bool carried = known != HAPI_NONE && nearby->world->bodies.entries[known].rest->geom != NULL;
+  uint64_t holder = slot != HAPI_NONE && !carried ? nearby->slots.bodies[slot].generation : 0;
   uint64_t name = hapi_geom_names_get(&nearby->tools.names, geom, nearby->cycle->model_number + 1);
   uint64_t key = name + (holder << 48);
   return hapi_tool_key(key, pointer, hapi_state_pointers(nearby->cycle->state)[pointer].generation);
@@ -249,7 +250,7 @@ static void search_begin(tool_search *s, hapi_nearby *nearby, const hapi_tool_at
                          const hap_pose *pose)
 {
   const hapi_state_pointer *pointer = at->pointer;
-  dBodyID body = dGeomGetBody(at->geom);
+  dBodyID body = hapi_geom_body(nearby->world, at->geom);
   s->nearby = nearby;
   s->at = at;
   s->pose = *pose;
@@ -260,9 +261,9 @@ static void search_begin(tool_search *s, hapi_nearby *nearby, const hapi_tool_at
   s->triangles = 0;
   s->has_shape = false;
   /* How fast a point of the pointer may come nearer to the geom. */
-  double speed = hapi_neighbors_speed(at->geom, pointer, pointer->pose.position) +
+  double speed = hapi_neighbors_speed(nearby, at->geom, pointer, pointer->pose.position) +
                  pointer->extent * hapi_v3_norm(pointer->twist.angular) +
-                 hapi_neighbors_spin(at->geom, pointer->extent);
+                 hapi_neighbors_spin(nearby, at->geom, pointer->extent);
   s->margin = fmin(at->reach, hapi_neighbors_reach(speed, at->horizon));
   int kind = dGeomGetClass(at->geom);
   if (hapi_geom_has_triangles(at->geom)) {
@@ -323,13 +324,14 @@ const hapi_tool_side *hapi_tool_told(hapi_nearby *nearby, dGeomID geom, uint32_t
   const hapi_tool_side *side =
       hapi_tool_side_find(hapi_state_sides(nearby->cycle->state), nearby->cycle->state->side_count,
                           hapi_tool_geom_key(nearby, geom, pointer), pointer);
-  dBodyID body = dGeomGetBody(geom);
+  dBodyID body = hapi_geom_body(nearby->world, geom);
   if (side == NULL || body == NULL) {
     return side;
   }
   uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
   uint32_t slot = known != HAPI_NONE ? nearby->world->bodies.entries[known].slot : HAPI_NONE;
-  bool same = slot != HAPI_NONE && nearby->slots.bodies[slot].epoch == side->epoch;
+  bool same = slot != HAPI_NONE &&
+              (side->body == HAPI_SLOT_NONE || nearby->slots.bodies[slot].epoch == side->epoch);
   return same ? side : NULL;
 }
 
@@ -589,7 +591,7 @@ static void slot_place(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_
                        const hapi_found_point *point)
 {
   const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer];
-  dBodyID body = dGeomGetBody(hit->geom);
+  dBodyID body = hapi_geom_body(nearby->world, hit->geom);
   double normal[3];
   hapi_pose_point(pointer->pose.position, pointer->pose.quat_wxyz, point->tool.at.core_a,
                   slot->point_world);
@@ -604,7 +606,7 @@ static void slot_place(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_
   slot->has_shape = false;
   slot->distance = point->gap;
   slot->placed = slot->is_tool = slot->wanted = true;
-  slot->speed = hapi_neighbors_speed(hit->geom, pointer, slot->point_world);
+  slot->speed = hapi_neighbors_speed(nearby, hit->geom, pointer, slot->point_world);
   slot->stiffness = pointer->stiffness;
   slot->finger_radius = pointer->finger_radius;
   slot->mu = hit->mu;

@@ -166,6 +166,11 @@ void hapi_course_note(hapi_course_past *past, const hap_pose *pose, const hap_tw
   memcpy(past->set, now, sizeof now);
 }
 
+void hapi_course_stand(hapi_course_past *past, const hap_pose *pose, double seconds)
+{
+  *past = (hapi_course_past){.known = true, .count = ORDERS, .seconds = seconds, .place = *pose};
+}
+
 /* The lowest order, beginning with one, that has missed about as little as the best. */
 static int order_choose(const hapi_course_past *past, int part, int from, double best)
 {

@@ -152,7 +152,7 @@ static void sync_in(hapi_physics *physics)
   hapi_physics_fill_settings(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
   call_step(physics, physics->world.ode.before_step);
-  if (hapi_physics_scan(physics) < HAP_OK) {
+  if (hapi_physics_scan(physics, true) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
   int64_t begin_ns = hapi_clock_now();

@@ -45,10 +45,10 @@ void hapi_physics_listen(hapi_physics *physics)
                                             .surface_asked = listener_surface_asked};
 }
 
-hap_status hapi_physics_scan(hapi_physics *physics)
+hap_status hapi_physics_scan(hapi_physics *physics, bool syncs)
 {
   pthread_mutex_lock(&physics->drawing.lock);
-  hap_status status = hapi_bodies_scan(&physics->world, &physics->cycle);
+  hap_status status = hapi_bodies_scan(&physics->world, &physics->cycle, syncs);
   pthread_mutex_unlock(&physics->drawing.lock);
   return status;
 }
@@ -113,6 +113,7 @@ hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
 {
   physics->world.bodies.geoms_forgotten = true;
+  hapi_carriers_forget(&physics->world.carriers, (dGeomID)(uintptr_t)geom);
   hapi_nearby_forget_geom(&physics->near, (dGeomID)(uintptr_t)geom);
   hapi_lookback_forget_geom(&physics->lookback, (dGeomID)(uintptr_t)geom);
 }
@@ -134,7 +135,8 @@ hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const
   if (count > HAP_TRACE_BODIES_MAX) {
     return HAP_ERROR_CAPACITY;
   }
-  hap_status status = hapi_physics_scan(physics); /* some may have been made since the last one */
+  hap_status status =
+      hapi_physics_scan(physics, false); /* some may have been made since the last one */
   if (status < HAP_OK) {
     return status;
   }

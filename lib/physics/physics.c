@@ -40,7 +40,7 @@ static bool init_locks(hapi_physics *physics)
 /* The world as it is must be one that can be stepped. */
 static hap_status check_world(hapi_physics *physics, hap_detail *detail)
 {
-  if (hapi_physics_scan(physics) < HAP_OK) {
+  if (hapi_physics_scan(physics, false) < HAP_OK) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the table of bodies");
   }
   hapi_joints_scan(&physics->world);
@@ -119,7 +119,7 @@ static void give_world_back(hapi_physics *physics)
 {
   dJointGroupEmpty(physics->world.contact_group);
   /* What was destroyed since the last cycle must not be given anything back. */
-  (void)hapi_physics_scan(physics); /* a body without memory for it was given nothing */
+  (void)hapi_physics_scan(physics, false); /* a body without memory for it was given nothing */
   const hapi_body_table *table = &physics->world.bodies;
   for (uint32_t i = 0; i < table->high; ++i) {
     if (table->entries[i].body != NULL) {
@@ -180,6 +180,7 @@ static void physics_prepare(hapi_physics *physics)
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
 {
   physics->world.begun = true;
+  hapi_carriers_reset(&physics->world.carriers); /* what was moved meanwhile stands */
   hapi_account_reset(&physics->account);
   hapi_feedback_reset(&physics->feedback);
   hapi_slots_reset(&physics->near); /* the scan leaves what is local to others */

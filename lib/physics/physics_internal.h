@@ -76,8 +76,9 @@ void hapi_physics_fill_settings(hapi_physics *physics);
 void hapi_physics_enter_dial(hapi_physics *physics);
 
 /* intake.c */
-void hapi_physics_listen(hapi_physics *physics);     /* to the world, which is created after that */
-hap_status hapi_physics_scan(hapi_physics *physics); /* reads which bodies there are */
+void hapi_physics_listen(hapi_physics *physics); /* to the world, which is created after that */
+/* Reads which bodies there are. syncs: once in a cycle. */
+hap_status hapi_physics_scan(hapi_physics *physics, bool syncs);
 /* ODE would abort on what the world holds. *out_text says what it is and what to do. After a
  * scan. */
 bool hapi_physics_is_unsound(const hapi_physics *physics, hap_detail *out_text);

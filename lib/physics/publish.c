@@ -115,12 +115,18 @@ static bool is_zero(const hap_twist *twist)
 
 /* A kinematic body that is moved by its pose alone has the velocity of its way in the next step: in
  * the loop it would stand until the next sync else. */
-static void fill_course(const publishing *p, hapi_slot_account *of, hapi_model *model,
-                        hapi_model_body *out)
+static void fill_course(const publishing *p, const hapi_known_body *known, hapi_slot_account *of,
+                        hapi_model *model, hapi_model_body *out)
 {
+  const hapi_posed_way *way = known->posed ? &known->rest->way : NULL;
   hapi_model_course *course = &hapi_model_courses(model)[model->course_count];
   double period = p->cycle->probe_step_s;
   double scale = p->cycle->time_scale;
+  if (way != NULL && way->fresh) {
+    hapi_course_stand(&of->course, &way->before, period);
+  } else if (way != NULL && !of->course.known) {
+    hapi_course_note(&of->course, &way->before, &out->twist, 0.0);
+  }
   hapi_course_note(&of->course, &out->pose, &out->twist, p->cycle->step_s);
   if (!(scale > 0.0)) {
     return; /* a pause: it stands */
@@ -129,8 +135,10 @@ static void fill_course(const publishing *p, hapi_slot_account *of, hapi_model *
   if (is_zero(&out->twist)) {
     hapi_course_mean(course, &out->twist);
   }
-  if (p->cycle->model == HAP_MODEL_CONTACT) {
-    hapi_course_scale(scale, course);
+  hapi_course_scale(scale, course);
+  course->begins = way != NULL && way->fresh;
+  course->before = way != NULL ? way->before : out->pose;
+  if (p->cycle->model == HAP_MODEL_CONTACT || course->begins != 0) {
     out->course = ++model->course_count;
   }
 }
@@ -151,7 +159,7 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, ha
   hapi_twist_read(body, &out->twist);
   of->course.known &= (slot->flags & HAPI_BODY_DRIVEN) != 0;
   if ((slot->flags & HAPI_BODY_DRIVEN) != 0) {
-    fill_course(p, of, model, out);
+    fill_course(p, &p->world->bodies.entries[slot->known], of, model, out);
   }
   memcpy(out->b, answer->b, sizeof out->b);
   memcpy(out->residual, of->residual, sizeof out->residual);

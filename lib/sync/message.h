@@ -46,6 +46,7 @@ typedef struct hapi_tool_hull {
 typedef struct hapi_tool_side {
   uint64_t key; /* of hull and geom */
   uint32_t pointer;
+  uint32_t body;  /* slot; HAPI_SLOT_NONE: the static world, also of a geom that has moved since */
   uint32_t epoch; /* of the body */
   hap_pose place; /* of the hull if it could not enter the geom */
   double way[3];  /* m, from where it is to there */

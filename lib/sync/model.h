@@ -132,8 +132,9 @@ typedef struct hapi_model_joint {
 /* How a driven body is expected to go until the next sync: its way since hapi_model.state_ns, the
  * sum of ways[k] t^(k + 1), t in s; after the period as fast as at its end. */
 typedef struct hapi_model_course {
-  uint32_t leaps; /* it is put back at syncs: no difference is brought in */
-  uint32_t reserved;
+  uint32_t leaps;  /* it is put back at syncs: no difference is brought in */
+  uint32_t begins; /* it was part of the static world until now, at: */
+  hap_pose before;
   double period_s;
   double ways[HAPI_COURSE_ORDER][6]; /* m, rad, world axes */
 } hapi_model_course;
@@ -153,8 +154,9 @@ typedef struct hapi_model_body {
 
   double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
 
-  /* Model CONTACT only. */
   uint32_t course; /* of a driven one: 1 + index into the model's courses; 0: by its twist */
+
+  /* Model CONTACT only. */
   double mass;
   double gravity[3];     /* m/s^2; zero where the body has none */
   double user_wrench[6]; /* N, N m about the centre of mass: the application's, held */
@@ -228,8 +230,8 @@ typedef struct hapi_model {
   uint32_t joint_count;    /* model CONTACT */
   uint32_t tool_count;     /* of models but CONTACT, where the contact thread tells them */
   uint32_t cross_count;    /* model ACCELERANCE */
-  uint32_t course_count;   /* model CONTACT */
-  uint32_t triangle_count; /* likewise */
+  uint32_t course_count;   /* of models but CONTACT those alone that begin */
+  uint32_t triangle_count; /* model CONTACT */
   uint32_t bodies_offset;
   uint32_t contacts_offset;
   uint32_t joints_offset;

@@ -42,7 +42,7 @@ static void told_place_now(const hapi_tool_seek *seek, told_place *out)
   double turn[4];
   hap_pose place = told->place;
   hapi_v3_copy(told->way, way);
-  if (seek->body != NULL) {
+  if (seek->body != NULL && told->body != HAPI_SLOT_NONE) {
     const double *q = seek->body->quat_wxyz;
     hapi_pose_point(seek->body->position, q, told->place.position, place.position);
     hapi_quat_multiply(q, told->place.quat_wxyz, place.quat_wxyz);

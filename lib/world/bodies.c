@@ -1,5 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <math.h>
 #include <string.h>
 
 #include "base/alloc.h"
@@ -172,7 +173,7 @@ static bool is_zero(const dReal *v)
 /* All that a cycle wants to know of a body that is far from the pointers, at once: each look is
  * at memory that is not at hand. Of a local body what holds after the loop's state was taken
  * counts. */
-static void look_at(hapi_world *world, hapi_known_body *known)
+static void look_at(hapi_world *world, const hapi_cycle *cycle, hapi_known_body *known)
 {
   hapi_body_table *table = &world->bodies;
   dBodyID body = known->body;
@@ -189,6 +190,9 @@ static void look_at(hapi_world *world, hapi_known_body *known)
   if (world->begun) {
     hapi_sleep_follow(known);
   }
+  if (world->carriers.syncs) {
+    hapi_extent_follow_way(known, cycle->step_s);
+  }
   /* What is written must go back to memory: not where nobody pushes. */
   const dReal *force = dBodyGetForce(known->body);
   const dReal *torque = dBodyGetTorque(known->body);
@@ -204,7 +208,8 @@ static void look_at(hapi_world *world, hapi_known_body *known)
   double speed = hapi_extent_speed(known);
   hapi_extent_rest(known, speed);
   table->fastest = speed > table->fastest ? speed : table->fastest;
-  const char *unsound = hapi_body_unsoundness(body, known->jointed);
+  const char *unsound =
+      known->rest->geom == NULL ? hapi_body_unsoundness(body, known->jointed) : NULL;
   if (unsound != NULL && table->unsound.body == NULL) {
     table->unsound.body = body;
     table->unsound.text = unsound;
@@ -213,7 +218,7 @@ static void look_at(hapi_world *world, hapi_known_body *known)
 
 /* False: there is no memory for a new body. The scan goes on, as it must find out which of the
  * known ones are gone; after the first one it asks for no more memory. */
-static bool see_body(hapi_world *world, dBodyID body)
+static bool see_body(hapi_world *world, const hapi_cycle *cycle, dBodyID body)
 {
   hapi_body_table *table = &world->bodies;
   uint32_t index = find_next(table, body);
@@ -225,28 +230,55 @@ static bool see_body(hapi_world *world, dBodyID body)
     if (table->starved) {
       return false;
     }
+    table->entries[index].rest->geom = hapi_carried_geom(&world->carriers, body);
     table->listener->body_begun(table->listener->physics, index);
   }
   table->last_seen = index;
   hapi_known_body *known = &table->entries[index];
   known->found = true;
   if (known->seen != table->scan) { /* by another of its geoms */
-    look_at(world, known);
+    look_at(world, cycle, known);
   }
   return true;
 }
 
+/* A sound geom without a body. One that has just begun to move was static at the last sync. */
+static void see_loose_geom(hapi_world *world, const hapi_cycle *cycle, dGeomID geom)
+{
+  hapi_body_table *table = &world->bodies;
+  hapi_carrier_meeting met;
+  dBodyID before = hapi_carrier_of(&world->carriers, geom);
+  uint32_t known = hapi_bodies_find(table, before);
+  bool may_end = known == HAPI_NONE || table->entries[known].slot == HAPI_NONE;
+  bool moves = dGeomGetClass(geom) != dRayClass;
+  table->starved |=
+      moves && !hapi_carriers_meet(&world->carriers, geom, table->scan, may_end, &met);
+  if (!moves || table->starved || met.body == NULL || !see_body(world, cycle, met.body)) {
+    return;
+  }
+  if (met.is_new) {
+    hapi_known_body *carrier = &table->entries[table->last_seen];
+    hapi_carriers_place(&world->carriers, geom);
+    hapi_extent_follow_way(carrier, cycle->step_s);
+    carrier->rest->way.fresh = true;
+    table->fastest = fmax(table->fastest, hapi_extent_speed(carrier));
+  }
+}
+
 /* A geom whose sizes and offset are as they were is as sound as its body's pose is. One that is
  * not is looked at again in each scan. */
-static void see_geom(hapi_world *world, dGeomID geom)
+static void see_geom(hapi_world *world, const hapi_cycle *cycle, dGeomID geom)
 {
   hapi_body_table *table = &world->bodies;
   dBodyID body = dGeomGetBody(geom);
   hapi_known_body *known =
-      body != NULL && see_body(world, body) ? &table->entries[table->last_seen] : NULL;
+      body != NULL && see_body(world, cycle, body) ? &table->entries[table->last_seen] : NULL;
   bool same = known != NULL && known->sized && !known->measured;
   bool posed = same || body == NULL || hapi_pose_is_sound(body);
   if (same || (posed && hapi_geom_is_sound(geom))) {
+    if (body == NULL) {
+      see_loose_geom(world, cycle, geom);
+    }
     return;
   }
   table->unsound.geom = posed && table->unsound.geom == NULL ? geom : table->unsound.geom;
@@ -255,21 +287,21 @@ static void see_geom(hapi_world *world, dGeomID geom)
   }
 }
 
-static void see_space(hapi_world *world, dSpaceID space)
+static void see_space(hapi_world *world, const hapi_cycle *cycle, dSpaceID space)
 {
   int count = dSpaceGetNumGeoms(space);
   for (int i = 0; i < count; ++i) {
     dGeomID geom = dSpaceGetGeom(space, i);
     if (dGeomIsSpace(geom)) {
-      see_space(world, (dSpaceID)geom);
+      see_space(world, cycle, (dSpaceID)geom);
     } else {
-      see_geom(world, geom);
+      see_geom(world, cycle, geom);
     }
   }
 }
 
 /* The bodies that joints connect to this one; true when one of them was not seen in this scan. */
-static bool see_partners(hapi_world *world, dBodyID body)
+static bool see_partners(hapi_world *world, const hapi_cycle *cycle, dBodyID body)
 {
   hapi_body_table *table = &world->bodies;
   bool found = false;
@@ -279,14 +311,14 @@ static bool see_partners(hapi_world *world, dBodyID body)
     uint32_t index = hapi_bodies_find(table, other);
     bool seen = index != HAPI_NONE && table->entries[index].seen == table->scan;
     if (other != NULL && !seen) {
-      found = see_body(world, other) || found;
+      found = see_body(world, cycle, other) || found;
     }
   }
   return found;
 }
 
 /* Bodies without a geom are known by their joints to known ones: walks until nothing is new. */
-static void see_jointed(hapi_world *world)
+static void see_jointed(hapi_world *world, const hapi_cycle *cycle)
 {
   hapi_body_table *table = &world->bodies;
   bool found = table->jointed_count > 0;
@@ -295,7 +327,7 @@ static void see_jointed(hapi_world *world)
     for (uint32_t i = 0; i < table->high; ++i) {
       const hapi_known_body *known = &table->entries[i];
       if (known->body != NULL && known->seen == table->scan && known->jointed) {
-        found = see_partners(world, table->entries[i].body) || found;
+        found = see_partners(world, cycle, table->entries[i].body) || found;
       }
     }
   }
@@ -324,11 +356,15 @@ static void drop_unseen(hapi_world *world, const hapi_cycle *cycle)
     /* Of an adopted body without geom and joint only the application knows whether it lives, unless
      * another one is at its address. */
     if (known->rest->adopted && !known->found && !hapi_mark_is_gone(known)) {
-      look_at(world, known);
+      look_at(world, cycle, known);
       continue;
     }
+    dBodyID carrier = known->rest->geom != NULL ? known->body : NULL;
     remove_entry(table, i);
-    ++dropped;
+    dropped += carrier == NULL;
+    if (carrier != NULL) {
+      dBodyDestroy(carrier);
+    }
   }
   /* Once a run: an application that does it does it often. The statistics count on. */
   uint32_t lost = dropped + table->replaced;
@@ -343,7 +379,7 @@ static void drop_unseen(hapi_world *world, const hapi_cycle *cycle)
   table->replaced = 0;
 }
 
-hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle)
+hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle, bool syncs)
 {
   hapi_body_table *table = &world->bodies;
   ++table->scan;
@@ -352,8 +388,10 @@ hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle)
   table->last_seen = HAPI_NONE;
   table->fastest = 0.0;
   table->unsound = (hapi_unsound){NULL, NULL, NULL};
-  see_space(world, world->ode.space);
-  see_jointed(world);
+  hapi_carriers_begin_scan(&world->carriers, syncs);
+  see_space(world, cycle, world->ode.space);
+  hapi_carriers_end_scan(&world->carriers, table->scan);
+  see_jointed(world, cycle);
   drop_unseen(world, cycle);
   HAPI_ASSERT(table->used <= table->high && table->high <= table->capacity);
   table->geoms_forgotten = false;
@@ -392,7 +430,7 @@ hap_status hapi_bodies_set_moved_callback(hapi_world *world, const hapi_cycle *c
   hap_status status = HAP_OK;
   uint32_t index = find_living(&world->bodies, body);
   if (index == HAPI_NONE) {
-    status = hapi_bodies_scan(world, cycle); /* it may have been made since the last one */
+    status = hapi_bodies_scan(world, cycle, false); /* it may have been made since the last one */
     index = hapi_bodies_find(&world->bodies, body);
   }
   if (index == HAPI_NONE) {

@@ -38,6 +38,14 @@ typedef struct hapi_mark {
   double angular_threshold; /* rad/s */
 } hapi_mark;
 
+/* How a kinematic body went that the application moves by its pose alone. */
+typedef struct hapi_posed_way {
+  bool fresh;      /* a carrier that began at the last sync: it was static before */
+  hap_pose place;  /* at the last sync */
+  hap_pose before; /* at the one before it */
+  hap_twist rate;  /* between them */
+} hapi_posed_way;
+
 /* What a step does not read for a body that is far from the pointers and has not changed. */
 typedef struct hapi_known_rest {
   uint64_t birth; /* number of this life of the entry, from 1: addresses come again */
@@ -48,6 +56,8 @@ typedef struct hapi_known_rest {
   hapi_sleep sleep;
   double damping[2]; /* as the application means it, while converted: soften.c */
   void (*moved_callback)(dBodyID);
+  dGeomID geom; /* of a carrier, world/carriers.h; NULL: a body of the world */
+  hapi_posed_way way;
 } hapi_known_rest;
 
 /* 64 bytes: a scan goes through the memory of all of them. */
@@ -74,6 +84,7 @@ typedef struct hapi_known_body {
   bool
       sleep_automatic; /* ODE's flag as the application set it; kept by us while the session runs */
   bool awake;          /* after the last global step */
+  bool posed;          /* moves by its pose alone: rest->way */
   uint16_t still; /* cycles in a row in which it was at rest, up to HAPI_STILL_MOST; 0: it is new */
 } hapi_known_body;
 
@@ -125,8 +136,9 @@ typedef struct hapi_body_table {
 hap_status hapi_bodies_init(hapi_body_table *table, const hapi_world_listener *listener);
 void hapi_bodies_finish(hapi_body_table *table);
 uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_NONE */
-/* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. */
-hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle);
+/* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. syncs: once in a
+ * cycle, when what the application has moved counts. */
+hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle, bool syncs);
 hap_status hapi_bodies_adopt(hapi_body_table *table, dBodyID body);
 hap_status hapi_bodies_forget(hapi_body_table *table, dBodyID body);
 /* Whose the body of an entry is: the loop's, which touched it, or ODE's. */
@@ -138,6 +150,10 @@ hap_status hapi_bodies_set_moved_callback(hapi_world *world, const hapi_cycle *c
 bool hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms have changed: true */
 /* m/s, of its surface; 0 for one that sleeps */
 double hapi_extent_speed(const hapi_known_body *known);
+/* At a sync, after a step of that length: how a body that is moved by its pose goes. */
+void hapi_extent_follow_way(hapi_known_body *known, double seconds);
+/* ODE's twist, or that of its poses. */
+void hapi_extent_twist(const hapi_known_body *known, hap_twist *out);
 /* Once a cycle: counts in known->still whether it is at rest at that speed. */
 void hapi_extent_rest(hapi_known_body *known, double speed);
 

@@ -11,11 +11,18 @@
 
 #define REST_SPEED 2e-3 /* m/s */
 
-static double extent_measure(dBodyID body)
+/* Of a carrier the geom that it is of. */
+static dGeomID first_geom(const hapi_known_body *known)
 {
-  const dReal *at = dBodyGetPosition(body);
+  dGeomID geom = dBodyGetFirstGeom(known->body);
+  return geom != NULL ? geom : known->rest->geom;
+}
+
+static double extent_measure(const hapi_known_body *known)
+{
+  const dReal *at = dBodyGetPosition(known->body);
   double extent = 0.0;
-  for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+  for (dGeomID geom = first_geom(known); geom != NULL; geom = dBodyGetNextGeom(geom)) {
     dReal box[6];
     double far2 = 0.0;
     dGeomGetAABB(geom, box);
@@ -67,11 +74,11 @@ static int sizes_of(dGeomID geom, int kind, dVector3 out)
   }
 }
 
-static uint64_t print_of(dBodyID body, bool *out_sized)
+static uint64_t print_of(const hapi_known_body *known, bool *out_sized)
 {
   uint64_t print = 1;
   *out_sized = true;
-  for (dGeomID geom = dBodyGetFirstGeom(body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
+  for (dGeomID geom = first_geom(known); geom != NULL; geom = dBodyGetNextGeom(geom)) {
     dVector3 sizes = {0};
     int kind = dGeomGetClass(geom);
     int count = sizes_of(geom, kind, sizes);
@@ -89,12 +96,14 @@ static uint64_t print_of(dBodyID body, bool *out_sized)
 
 bool hapi_extent_follow(hapi_known_body *known)
 {
-  uint64_t print = print_of(known->body, &known->sized);
+  bool sized;
+  uint64_t print = print_of(known, &sized);
+  known->sized = sized;
   if (print == known->geoms_print) {
     return false;
   }
   known->geoms_print = print;
-  known->extent = extent_measure(known->body);
+  known->extent = extent_measure(known);
   return true;
 }
 
@@ -109,6 +118,57 @@ double hapi_extent_speed(const hapi_known_body *known)
   if (!dBodyIsEnabled(known->body)) {
     return 0.0;
   }
-  return hapi_v3_norm(dBodyGetLinearVel(known->body)) +
-         known->extent * hapi_v3_norm(dBodyGetAngularVel(known->body));
+  hap_twist twist;
+  hapi_extent_twist(known, &twist);
+  return hapi_v3_norm(twist.linear) + known->extent * hapi_v3_norm(twist.angular);
+}
+
+void hapi_extent_twist(const hapi_known_body *known, hap_twist *out)
+{
+  if (known->posed) {
+    *out = known->rest->way.rate;
+  } else {
+    hapi_twist_read(known->body, out);
+  }
+}
+
+static bool no_velocity(const dReal *v)
+{
+  return v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0;
+}
+
+static void way_rate(const hap_pose *from, const hap_pose *to, double seconds, hap_twist *out)
+{
+  const double back[4] = {from->quat_wxyz[0], -from->quat_wxyz[1], -from->quat_wxyz[2],
+                          -from->quat_wxyz[3]};
+  double turn[4];
+  hapi_v3_sub(to->position, from->position, out->linear);
+  hapi_v3_scale(1.0 / seconds, out->linear, out->linear);
+  hapi_quat_multiply(to->quat_wxyz, back, turn);
+  double sine = hapi_v3_norm(turn + 1);
+  double angle = 2.0 * atan2(sine, fabs(turn[0]));
+  double rate = sine > 0.0 ? copysign(angle / (sine * seconds), turn[0]) : 0.0;
+  hapi_v3_scale(rate, turn + 1, out->angular);
+}
+
+void hapi_extent_follow_way(hapi_known_body *known, double seconds)
+{
+  dBodyID body = known->body;
+  bool still = no_velocity(dBodyGetLinearVel(body)) && no_velocity(dBodyGetAngularVel(body));
+  if (!still || !dBodyIsEnabled(body) || !dBodyIsKinematic(body)) {
+    known->posed = false;
+    return;
+  }
+  hapi_posed_way *way = &known->rest->way;
+  hap_pose now;
+  hapi_pose_read(body, &now);
+  way->fresh = false;
+  if (!known->posed) {
+    *way = (hapi_posed_way){.place = now, .before = now};
+    known->posed = true;
+  } else if (seconds > 0.0) {
+    way_rate(&way->place, &now, seconds, &way->rate);
+    way->before = way->place;
+    way->place = now;
+  }
 }

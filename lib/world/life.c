@@ -110,6 +110,12 @@ double hapi_body_mass(dBodyID body)
   return mass.mass;
 }
 
+dBodyID hapi_geom_body(const hapi_world *world, dGeomID geom)
+{
+  dBodyID body = dGeomGetBody(geom);
+  return body != NULL ? body : hapi_carrier_of(&world->carriers, geom);
+}
+
 /* ---- the world ---- */
 
 bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint_slots,
@@ -135,6 +141,7 @@ void hapi_world_finish(hapi_world *world)
     dJointGroupDestroy(world->contact_group);
   }
   hapi_bodies_finish(&world->bodies);
+  hapi_carriers_finish(&world->carriers);
   hapi_joints_finish(&world->joints);
   if (world->surfaces != NULL) {
     hapi_free(world->surfaces->entries);

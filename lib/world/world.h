@@ -11,6 +11,7 @@
 #include <hapode/ode.h>
 
 #include "world/bodies.h"
+#include "world/carriers.h"
 #include "world/cycle.h"
 #include "world/joints.h"
 #include "world/surfaces.h"
@@ -57,6 +58,7 @@ struct hapi_world {
   hapi_claim claim;
   bool begun; /* a session has taken the world over, and the bodies' sleep with it */
   hapi_body_table bodies;
+  hapi_carriers carriers;
   hapi_joint_table joints;
   hapi_surface_cache *surfaces;
   hapi_contact_notes *notes;
@@ -75,6 +77,9 @@ bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint
 void hapi_world_finish(hapi_world *world);
 void hapi_world_step(hapi_world *world, double step_s); /* the global step */
 double hapi_body_mass(dBodyID body);                    /* 0 for a kinematic one */
+
+/* life.c: the body that a geom is of for the loop: its own, or its carrier; NULL: it is static */
+dBodyID hapi_geom_body(const hapi_world *world, dGeomID geom);
 
 /* flight.c */
 /* Just before the global step, after the collision phase: what flies is put back by what the step
