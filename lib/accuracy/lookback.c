@@ -471,10 +471,11 @@ static bool body_is_posed(const hapi_known_body *known)
   return known->posed && hapi_v3_norm(rate.linear) + hapi_v3_norm(rate.angular) > 0.0;
 }
 
-static bool slot_is_posed(const hapi_lookback *w, const hapi_contact_slot *slot)
+/* Of a geom without a body, which may have begun to move in the window. */
+static bool geom_is_carried(const hapi_lookback *w, dGeomID geom)
 {
-  uint32_t known =
-      slot->body != HAPI_SLOT_NONE ? w->near->slots.bodies[slot->body].known : HAPI_NONE;
+  dBodyID carrier = hapi_carrier_of(&w->world->carriers, geom);
+  uint32_t known = hapi_bodies_find(&w->world->bodies, carrier);
   return known != HAPI_NONE && body_is_posed(&w->world->bodies.entries[known]);
 }
 
@@ -491,7 +492,7 @@ void hapi_lookback_note(hapi_lookback *w)
                                        .is_tool = slot->is_tool,
                                        .mu = slot->mu};
     if (slot->phase == HAPI_SLOT_LIVE) {
-      w->spoilt = w->spoilt || slot_is_posed(w, slot);
+      w->spoilt = w->spoilt || geom_is_carried(w, slot->geom);
       window_note_touch(w, w->cycle->config->capacity.contacts, &touch);
     }
   }
