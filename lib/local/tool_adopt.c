@@ -6,6 +6,7 @@
 
 #include "base/assert.h"
 #include "base/vec.h"
+#include "local/touch_frame.h"
 
 /* The points of a hull's patches are found anew again and again. One that is near to where one of
  * the same pair was is that one, and keeps what it had. While a pair presses, others come in

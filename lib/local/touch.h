@@ -8,7 +8,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "base/pose.h"
 #include "base/wishes.h"
 #include "proximity/constrained_ball.h"
 #include "sync/messages.h"
@@ -62,19 +61,6 @@ typedef struct hapi_friction {
   double axes[3][4]; /* unit, at right angles; the first along the pull */
   uint32_t axis_count; /* 2; 3 with torsion */
 } hapi_friction;
-
-/* What was seen from the static world is seen from a body at that pose: the geom has got one. */
-static inline void hapi_friction_hand_over(const hap_pose *body, hapi_friction *io)
-{
-  hapi_friction_place *places[2] = {&io->set, &io->now};
-  for (int i = 0; i < 2; ++i) {
-    hapi_friction_place *at = places[i];
-    hapi_pose_unpoint(body->position, body->quat_wxyz, at->anchor_body, at->anchor_body);
-    hapi_quat_unrotate(body->quat_wxyz, at->normal_body, at->normal_body);
-    hapi_quat_unrotate(body->quat_wxyz, at->mark_body, at->mark_body);
-    hapi_quat_unrotate(body->quat_wxyz, at->stretch_body, at->stretch_body);
-  }
-}
 
 #define HAPI_NO_ROW 0xffffffffu
 

@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "base/assert.h"
-#include "base/pose.h"
 #include "local/tool_adopt.h"
+#include "local/touch_frame.h"
 
 static uint32_t epoch_of(const hapi_bodies *bodies, uint32_t slot)
 {
@@ -24,13 +24,6 @@ static void touches_keep(const hapi_touches *touches)
                                                .ramp = c->ramp,
                                                .ball = c->ball};
   }
-}
-
-static void ball_hand_over(const hap_pose *frame, hapi_constrained_ball *io)
-{
-  hapi_pose_unpoint(frame->position, frame->quat_wxyz, io->ball, io->ball);
-  hapi_pose_unpoint(frame->position, frame->quat_wxyz, io->center, io->center);
-  hapi_quat_unrotate(frame->quat_wxyz, io->normal, io->normal);
 }
 
 static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
@@ -64,7 +57,7 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
     out->ball.known &= kept->epoch == out->epoch; /* else the body was put elsewhere */
     if (kept->body == HAPI_SLOT_NONE && in->body != HAPI_SLOT_NONE) {
       const hap_pose *frame = hapi_body_frame_at_begin(bodies, in->body);
-      ball_hand_over(frame, &out->ball);
+      hapi_ball_hand_over(frame, &out->ball);
       hapi_friction_hand_over(frame, &touches->frictions[in->slot]);
     }
   }
