@@ -147,13 +147,7 @@ static void moved_step(void *user, double step_s)
 static void moved_close(void *owned)
 {
   moved *m = owned;
-  cw_close(&m->w);
-  if (m->mesh != NULL) {
-    dGeomTriMeshDataDestroy(m->mesh);
-  }
-  if (m->field != NULL) {
-    dGeomHeightfieldDataDestroy(m->field);
-  }
+  cw_close(&m->w); /* with the data of its geoms */
 }
 
 typedef struct moved_case {
