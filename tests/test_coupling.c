@@ -74,6 +74,18 @@ static void use_proxy(contact_world *w, double stiffness)
   w->hand_expert.coupling_stiffness = stiffness;
 }
 
+/* A floor, felt through a proxy. */
+static contact_world *proxy_wall(double stiffness, double coupling_stiffness)
+{
+  contact_world *w = cw_new(0.0);
+  cw_add_floor(w);
+  cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 1.0);
+  w->hand_def.stiffness = stiffness;
+  w->hand_def.damping = 0.0;
+  use_proxy(w, coupling_stiffness);
+  return w;
+}
+
 /* On the static floor, pressed 2 mm in. */
 TEST(a_wall_and_the_proxy_are_springs_in_series)
 {
@@ -81,12 +93,7 @@ TEST(a_wall_and_the_proxy_are_springs_in_series)
   for (size_t i = 0; i < sizeof stiffness / sizeof stiffness[0]; ++i) {
     double k = stiffness[i];
     double k_v = 500.0;
-    contact_world *w = cw_new(0.0);
-    cw_add_floor(w);
-    cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 1.0);
-    w->hand_def.stiffness = k;
-    w->hand_def.damping = 0.0;
-    use_proxy(w, k_v);
+    contact_world *w = proxy_wall(k, k_v);
     cw_start(w, 0.0, 0.0, HAND_RADIUS + 0.001);
     cw_go(w, 0.0, 0.0, -0.03, 100);
     cw_go(w, 0.0, 0.0, 0.0, 100);
@@ -109,15 +116,10 @@ TEST(the_spring_is_the_devices_whatever_its_frame_and_scales)
   const double k_device = 1500.0;
   const double k_v = k_device / 2.5;
   const double series = k * k_v / (k + k_v);
-  contact_world *w = cw_new(0.0);
-  cw_add_floor(w);
-  cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 1.0);
-  w->hand_def.stiffness = k;
-  w->hand_def.damping = 0.0;
+  contact_world *w = proxy_wall(k, k_device);
   w->hand_def.motion_scale = 5.0;
   w->hand_def.force_scale = 0.5;
   w->hand_def.pose_world_device = (hap_pose){{0.0, 0.0, 0.002}, {M_SQRT1_2, M_SQRT1_2, 0.0, 0.0}};
-  use_proxy(w, k_device);
   cw_start(w, 0.0, (HAND_RADIUS - 0.001) / 5.0, 0.0); /* y: 1 mm above the floor */
   cw_go(w, 0.0, -0.006, 0.0, 100);
   cw_go(w, 0.0, 0.0, 0.0, 100);
@@ -563,12 +565,7 @@ TEST(another_model_ends_the_proxy_and_contact_begins_it_anew)
   const double k = 8000.0;
   const double k_v = 500.0;
   const double series = k * k_v / (k + k_v);
-  contact_world *w = cw_new(0.0);
-  cw_add_floor(w);
-  cw_add_cube(w, 1.0, 0.1, 1.0, 0.0, 1.0);
-  w->hand_def.stiffness = k;
-  w->hand_def.damping = 0.0;
-  use_proxy(w, k_v);
+  contact_world *w = proxy_wall(k, k_v);
   cw_start(w, 0.0, 0.0, HAND_RADIUS + 0.001);
   cw_go(w, 0.0, 0.0, -0.03, 100);
   cw_go(w, 0.0, 0.0, 0.0, 100);

@@ -40,6 +40,14 @@ static double depth_of(const hap_pose *pose, const double *hull, size_t points)
   return deepest;
 }
 
+/* Above what is at z = 0. */
+static void tool_start_above(tool_world *w)
+{
+  tool_start(w);
+  tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
+  tool_run(w, 60);
+}
+
 TEST(in_the_air_a_god_object_tool_is_the_device_to_the_bit)
 {
   tool_world *w = tool_of(HAP_COUPLING_GOD_OBJECT);
@@ -62,9 +70,7 @@ TEST(a_tool_lies_on_the_floor)
     double deepest = 0.0;
     tool_world *w = tool_of(rigid_couplings[i]);
     tool_add_floor(w);
-    tool_start(w);
-    tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
-    tool_run(w, 60);
+    tool_start_above(w);
     for (int k = 0; k < 200; ++k) {
       tool_move(w, 0.0, 0.0, HALF + 0.002 - 3e-5 * k, 0.0, 1);
       deepest = fmax(deepest, depth_of(&w->state.proxy, w->hull, 8));
@@ -126,9 +132,7 @@ TEST(a_tool_rests_in_a_corner)
     tool_world *w = tool_of(rigid_couplings[i]);
     tool_add_floor(w);
     dCreatePlane(w->space, -1.0, 0.0, 0.0, -0.05);
-    tool_start(w);
-    tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
-    tool_run(w, 60);
+    tool_start_above(w);
     tool_move(w, 0.045, 0.0, HALF - 0.003, 0.0, 400);
     tool_run(w, 300);
     CHECK_NEAR(w->state.proxy.position[0], 0.05 - HALF, 1e-7);
@@ -146,9 +150,7 @@ TEST(friction_holds_a_tool_to_the_cone)
     tool_world *w = tool_of(rigid_couplings[i]);
     w->tool_def.friction = 0.5;
     tool_add_floor(w);
-    tool_start(w);
-    tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
-    tool_run(w, 60);
+    tool_start_above(w);
     tool_move(w, 0.0, 0.0, HALF - 0.004, 0.0, 100);
     tool_run(w, 300);
     CHECK_NEAR(w->state.wrench.force[2], 0.004 * KV, 1e-4);
@@ -184,9 +186,7 @@ TEST(friction_holds_a_tool_against_turning)
     tool_world *w = tool_of(rigid_couplings[i]);
     w->tool_def.friction = 0.5;
     tool_add_floor(w);
-    tool_start(w);
-    tool_go(w, 0.0, 0.0, HALF + 0.002, 0.0);
-    tool_run(w, 60);
+    tool_start_above(w);
     tool_move(w, 0.0, 0.0, HALF - 0.004, 0.0, 100);
     for (int k = 1; k <= 500; ++k) {
       double angle = 0.5 * k / 500.0 * most / spin_stiffness();

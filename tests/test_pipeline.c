@@ -278,16 +278,19 @@ TEST(a_slow_world_stays_together_whatever_the_seed)
 
 /* Placed so that the hand goes along +x into the first cube's face at x = 0, near y = 0 and
  * z = 0.025, and stays above the floor. */
-static const struct {
+typedef struct recorded_hand {
+  const char *name;
   const char *file;
   const char *arguments;
   double seconds;
-} recordings[] = {
-    {"dfki_index_tip.csv",
+} recorded_hand;
+
+static const recorded_hand recordings[] = {
+    {"an_index_finger_pushes_a_row", "dfki_index_tip.csv",
      "scale=0.15,rotate=0.8991/-0.018/-0.4357/-0.0371,offset=0.005/-0.0342/-0.036", 60.0},
-    {"broad_24_disturbed_tapping_A.csv",
+    {"a_tapping_hand_pushes_a_row", "broad_24_disturbed_tapping_A.csv",
      "scale=0.3,start=30.9,rotate=0.8791/0.0892/-0.1816/-0.4317,offset=0.137/-0.0405/-0.417", 4.0},
-    {"pyomeca_lift_hand_6d.csv",
+    {"a_lifting_hand_pushes_a_row", "pyomeca_lift_hand_6d.csv",
      "scale=0.1,start=1.4,rotate=0.9773/0/0/-0.2118,offset=-0.0335/-0.0182/-0.0425", 1.6},
 };
 
@@ -306,20 +309,19 @@ static const char *data_folder(char *out, size_t size)
   return out;
 }
 
-static void push_with_recording(size_t index)
+TEST_EACH(recordings, const recorded_hand *row)
 {
   char folder[500];
   char spec[1000];
   if (data_folder(folder, sizeof folder) == NULL) {
     SKIP("needs the recordings of HAPODE_SHARED/data");
   }
-  snprintf(spec, sizeof spec, "replay:%s/%s,%s", folder, recordings[index].file,
-           recordings[index].arguments);
+  snprintf(spec, sizeof spec, "replay:%s/%s,%s", folder, row->file, row->arguments);
   for (int m = 0; m < 3; ++m) {
     rig_options options = options_of("row10", models[m], 60.0);
     options.devices[0] = spec;
     options.device_count = 1;
-    outcome out = scene_run(&options, recordings[index].seconds);
+    outcome out = scene_run(&options, row->seconds);
     CHECK(out.good && out.finite);
     CHECK(out.stats.faults.count == 0 && out.stats.faults.states_rejected == 0);
     CHECK(out.stats.loop.contact_ticks >= 500);
@@ -330,19 +332,4 @@ static void push_with_recording(size_t index)
            out.largest_force, out.first_body_x,
            (unsigned long long)out.stats.faults.saturated_ticks);
   }
-}
-
-TEST(an_index_finger_pushes_a_row)
-{
-  push_with_recording(0);
-}
-
-TEST(a_tapping_hand_pushes_a_row)
-{
-  push_with_recording(1);
-}
-
-TEST(a_lifting_hand_pushes_a_row)
-{
-  push_with_recording(2);
 }

@@ -37,6 +37,15 @@ static void tool_stand(tool_world *w, double x, double y, double z, double angle
   memset(&w->twist, 0, sizeof w->twist);
 }
 
+/* From above what is at z = 0 into it. */
+static void tool_start_pressed(tool_world *w)
+{
+  tool_start(w);
+  tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
+  tool_run(w, 40);
+  tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
+}
+
 /* With its face flat on the ground, pressed into it. */
 static tool_world *tool_press(const ground *g)
 {
@@ -52,10 +61,7 @@ static tool_world *tool_press(const ground *g)
   } else {
     tool_add_floor(w);
   }
-  tool_start(w);
-  tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
-  tool_run(w, 40);
-  tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
+  tool_start_pressed(w);
   tool_run(w, 40);
   return w;
 }
@@ -333,10 +339,7 @@ TEST(points_that_leap_hold_where_they_are)
     w->tool_def.friction = MU;
     dGeomID box = dCreateBox(w->space, 0.016, 0.016, 0.1);
     dGeomSetPosition(box, 0.0, 0.0, -0.05);
-    tool_start(w);
-    tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
-    tool_run(w, 40);
-    tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
+    tool_start_pressed(w);
     tool_stand(w, 2e-4, 0.0, HALF - DEEP, 0.04);
     tool_run(w, 40);
     double stiffness = 2.0 * K * 0.008 * 0.008;
@@ -361,10 +364,7 @@ TEST(a_mesh_holds_as_a_floor)
     tool_world *w = tool_new(all[m]);
     w->tool_def.friction = MU;
     mesh_floor(w->space);
-    tool_start(w);
-    tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
-    tool_run(w, 40);
-    tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
+    tool_start_pressed(w);
     tool_stand(w, 4e-4, 0.0, HALF - DEEP, 0.0);
     tool_run(w, 1000);
     CHECK_NEAR(w->state.wrench.force[0], -K * 4e-4, 1e-3 * K * 4e-4);
@@ -410,10 +410,7 @@ TEST(each_geom_has_its_friction)
     asked.left = dCreateBox(w->space, 0.1, 0.2, 0.1);
     dGeomSetPosition(asked.left, -0.051, 0.0, -0.05);
     dGeomSetPosition(dCreateBox(w->space, 0.1, 0.2, 0.1), 0.051, 0.0, -0.05);
-    tool_start(w);
-    tool_go(w, 0.0, 0.0, HALF + 0.004, 0.0);
-    tool_run(w, 40);
-    tool_move(w, 0.0, 0.0, HALF - DEEP, 0.0, 60);
+    tool_start_pressed(w);
     tool_move(w, 0.0, 0.005, HALF - DEEP, 0.0, 100);
     CHECK(asked.calls > 0 && asked.came_with == 0.3);
     CHECK_NEAR(w->state.wrench.force[2], 2.0 * LOAD, 1e-3 * LOAD);
