@@ -50,6 +50,25 @@ TEST(whatever_addresses_the_heap_gives)
   unsetenv("GLIBC_TUNABLES");
 }
 
+/* In another order of addresses, with and without those that come again at once. */
+TEST(twenty_thousand_random_programs)
+{
+  if (strcmp(tap_argument, "long") != 0) {
+    SKIP("takes an hour; argument long");
+  }
+  for (int seed = 1; seed <= 20000; seed += 250) {
+    CHECK(run("--only random --seeds %d-%d", seed, seed + 249) == 0);
+    CHECK(lines_with(ran.out, "random") == 250);
+    file_write(folder_path("programs"), ran.out);
+    CHECK(run("--only random --seeds %d-%d --heap 1 --compare %s", seed, seed + 249,
+              folder_path("programs")) == 0);
+    setenv("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0", 1);
+    CHECK(run("--only random --seeds %d-%d --compare %s", seed, seed + 249,
+              folder_path("programs")) == 0);
+    unsetenv("GLIBC_TUNABLES");
+  }
+}
+
 TEST(another_bit_is_found)
 {
   CHECK(hash_into("plain", "lever", "") > 1);
