@@ -55,7 +55,7 @@ static hap_status late_tick(bench *b, const rig *r, late_felt *felt)
 static hap_status late_ticks(bench *b, const rig *r, const late_def *def, late_result *out)
 {
   late_felt felt = {{0.0}, 0.0, 0.0, 0};
-  hap_stats stats;
+  hap_stats stats = {0};
   uint64_t derated = 0;
   for (int t = 0; t < def->ticks; ++t) {
     bool pulsed = t >= def->begin && t < def->end;

@@ -238,10 +238,34 @@ TEST(messages_are_never_torn_in_either_direction)
 /* ---- the exchange ---- */
 
 static const hapi_capacity capacities[] = {
-    {1, 1, 1, 0, 0, 0, 0, 1, 2, 1},
-    {3, 5, 2, 0, 0, 0, 0, 7, 3, 9},
-    {64, 256, 4, 0, 0, 0, 0, 128, 64, 512},
-    {1024, 4096, 16, 0, 0, 0, 0, 2048, 64, 8192},
+    {.bodies = 1,
+     .contacts = 1,
+     .pairs = 1,
+     .pointers = 1,
+     .joints = 1,
+     .tool_points = 2,
+     .crosses = 1},
+    {.bodies = 3,
+     .contacts = 5,
+     .pairs = 5,
+     .pointers = 2,
+     .joints = 7,
+     .tool_points = 3,
+     .crosses = 9},
+    {.bodies = 64,
+     .contacts = 256,
+     .pairs = 256,
+     .pointers = 4,
+     .joints = 128,
+     .tool_points = 64,
+     .crosses = 512},
+    {.bodies = 1024,
+     .contacts = 4096,
+     .pairs = 4096,
+     .pointers = 16,
+     .joints = 2048,
+     .tool_points = 64,
+     .crosses = 8192},
 };
 #define CAPACITIES (sizeof capacities / sizeof capacities[0])
 

@@ -33,6 +33,7 @@ typedef struct hapi_cover {
 /* Boxes are low and high by axis, as ODE's. */
 static inline bool hapi_boxes_meet(const double a[6], const double b[6])
 {
+  /* cppcheck-suppress ctuArrayIndex ; the chunks of a mesh have six numbers each */
   return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3] && a[4] <= b[5] &&
          b[4] <= a[5];
 }

@@ -245,22 +245,22 @@ static void cycle_tell(hapi_physics *physics, double seconds)
   double late_s = seconds > cycle->probe_step_s ? physics->late_s + seconds : 0.0;
   physics->late_s = physics->config.lockstep ? 0.0 : late_s;
   if (physics->late_s > LATE_S) {
-    hapi_say_once(cycle, &physics->said_late,
+    hapi_say_once(cycle, &physics->said.late,
                   "physics takes longer than its period: the world is beyond real time; fewer "
                   "bodies, iterations or a lower physics_hz would help");
   }
   if (physics->room.cut_s > LATE_S) {
-    hapi_say_once(cycle, &physics->said_cut,
+    hapi_say_once(cycle, &physics->said.cut,
                   "more bodies touch than a tick has time for: the range ends before them, and the "
                   "force is approximate (hap_stats.room.range_most)");
   }
   if (cycle->state != NULL && cycle->state->unsolved >= UNSOLVED_TICKS) {
-    hapi_say_once(cycle, &physics->said_unsolved,
+    hapi_say_once(cycle, &physics->said.unsolved,
                   "more bodies touch than a tick can solve: the force is approximate "
                   "(hap_stats.contact.residual_max)");
   }
   if (cycle->state != NULL && cycle->state->derated) {
-    hapi_say_once(cycle, &physics->said_derated,
+    hapi_say_once(cycle, &physics->said.derated,
                   "ticks of the haptic loop come late: the force is lowered meanwhile "
                   "(hap_stats.safety.derated_ticks); real time or less to do would help");
   }

@@ -39,6 +39,14 @@ typedef struct hapi_pace {
   int64_t start_ns;
 } hapi_pace;
 
+/* Warnings that come once in a session. */
+typedef struct hapi_said {
+  bool late;
+  bool unsolved;
+  bool derated;
+  bool cut;
+} hapi_said;
+
 struct hapi_physics {
   hapi_physics_config config;
   hapi_cycle cycle;
@@ -62,10 +70,7 @@ struct hapi_physics {
   hapi_pace pace;
   bool world_faulty; /* holds a state that ODE would abort on: not stepped */
   double late_s;     /* of cycles that took longer than their period, one after the other */
-  bool said_late;
-  bool said_unsolved;
-  bool said_derated;
-  bool said_cut;
+  hapi_said said;
 };
 
 /* cycle.c: the collision phase, and testing simulations */

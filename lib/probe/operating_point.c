@@ -230,7 +230,9 @@ static bool edges_spare(hapi_probe *probe)
       }
     }
     HAPI_ASSERT(newest != NULL);
-    newest->spared = true;
+    if (newest != NULL) {
+      newest->spared = true;
+    }
   }
   bool any = false;
   for (uint32_t i = 0; i < pushed->count; ++i) {

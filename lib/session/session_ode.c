@@ -10,11 +10,11 @@
 #include "session/session_internal.h"
 
 /* What is kept of the last ticks for drawing: as long as poses.c may lie behind and more, in rows
- * of at most 8 MB, which are some ticks apart where that is not enough for all. */
+ * of at most 16 MB, which are some ticks apart where that is not enough for all. */
 #define TRAIL_STEPS 8.0
 #define TRAIL_ROWS_MOST 256u
 #define TRAIL_ROWS_LEAST 64u
-#define TRAIL_PLACES 131072u
+#define TRAIL_PLACES 262144u
 #define TRAIL_SPARE 16u
 
 /* What of the session has ODE types: create. The other calls of hapode/ode.h end in

@@ -70,7 +70,7 @@ static void place_pose(int kind, const double place[HAPI_GEOM_NUMBERS], hap_pose
     *out = (hap_pose){{place[0], place[1], place[2]}, {1.0, 0.0, 0.0, 0.0}};
     return;
   }
-  dMatrix3 rotation;
+  dMatrix3 rotation = {0.0};
   memcpy(rotation, place + 3, sizeof rotation);
   hapi_v3_copy(place, out->position);
   dRtoQ(rotation, out->quat_wxyz);
