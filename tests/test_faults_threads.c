@@ -55,7 +55,8 @@ static bool hand_presses(void)
 /* Where a busy machine holds up the loop meanwhile, that is a standstill, too. */
 static bool hand_presses_again(void)
 {
-  if (stats_of(&f.s).faults.fault == HAP_FAULT_BLOCKED) {
+  uint32_t fault = stats_of(&f.s).faults.fault;
+  if (fault == HAP_FAULT_BLOCKED || fault == HAP_FAULT_LATE) {
     CHECK(hap_session_reset_fault(f.s.session) == HAP_OK);
   }
   return hand_presses();

@@ -13,6 +13,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <hapode/stats.h>
+
 #include "tools/plot.h"
 
 /* The value of a key of the summary; NULL: it is not there. */
@@ -491,7 +493,7 @@ TEST(a_fault_leaves_its_last_ticks)
   unsigned pointer = 0;
   unsigned fault = 0;
   CHECK(sscanf(last, "%u,%*[^,],%u,%u,", &tick, &pointer, &fault) == 3);
-  CHECK(tick > 255 && pointer == 1 && fault == 2);
+  CHECK(tick > 255 && pointer == 1 && fault == HAP_FAULT_DEVICE_INPUT);
   CHECK(run("--lockstep --seconds 0.1 --black-box %s", box) == 0);
   CHECK(lines_of(box, last, sizeof last) == 1); /* no fault, no rows */
   CHECK(run("--lockstep --seconds 0.1 --black-box /no/such/place") == 1 && says("--black-box"));

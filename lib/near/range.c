@@ -497,7 +497,6 @@ static bool geom_is_known(dGeomID geom)
     case dCylinderClass:
     case dPlaneClass:
     case dConvexClass:
-      return true;
     case dTriMeshClass:
       return true;
     case dHeightfieldClass:

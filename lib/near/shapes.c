@@ -122,7 +122,7 @@ static near_answer nearest_of_triangles(hapi_nearby *nearby, dGeomID geom, const
 {
   uint32_t count = HAPI_NEAR_TRIANGLES;
   double far = radius + reach;
-  for (; far > 1e-6; far *= TRIANGLES_SHRINK) {
+  while (far > 1e-6) {
     double box[6];
     for (int k = 0; k < 6; ++k) {
       box[k] = center[k / 2] + (k % 2 == 0 ? -far : far);
@@ -131,6 +131,7 @@ static near_answer nearest_of_triangles(hapi_nearby *nearby, dGeomID geom, const
     if (count < HAPI_NEAR_TRIANGLES) {
       break;
     }
+    far *= TRIANGLES_SHRINK;
   }
   bool cut = far < radius + reach;
   if (count == HAPI_NEAR_TRIANGLES || (count == 0 && cut)) {

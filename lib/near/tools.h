@@ -82,7 +82,7 @@ typedef struct hapi_tool_box {
 const hapi_tool_side *hapi_tool_told(hapi_nearby *nearby, dGeomID geom, uint32_t pointer);
 /* Triangles of the geom in the box, as hapi_triangles_near; of more than there is room for, those
  * within a shorter reach, which is counted. */
-uint32_t hapi_tool_triangles(hapi_nearby *nearby, const hapi_tool_box *box, uint64_t walk);
+uint32_t hapi_tool_triangles(hapi_nearby *nearby, const hapi_tool_box *in, uint64_t walk);
 
 uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer);
 void hapi_tool_keep_places(hapi_nearby *nearby, const hapi_hit *hit, uint32_t body);

@@ -143,7 +143,7 @@ static hap_status run_cycle(hap_player *player, const hapi_cell *cells, uint32_t
                             hap_detail *detail)
 {
   hapi_tape *tape = &player->tapes[HAPI_STREAM_PHYSICS];
-  if (cells[0].kind != HAPI_CELL_CYCLE ||
+  if (cells == NULL || cells[0].kind != HAPI_CELL_CYCLE ||
       cells[0].u[HAPI_CYCLE_STATE] > count_published(player, HAPI_CHANNEL_STATE)) {
     return play_contradicts(player, "a physics step took a message that comes later", detail);
   }
@@ -160,7 +160,7 @@ static hap_status run_pass(hap_player *player, const hapi_cell *cell, hap_detail
   hapi_tape *tape = &player->tapes[HAPI_STREAM_CONTACT];
   hapi_exchange *exchange = player->session->exchange;
   uint64_t before = count_published(player, HAPI_CHANNEL_PATCHES);
-  if (cell->u[HAPI_PASS_POSES] > count_published(player, HAPI_CHANNEL_POSES) ||
+  if (cell == NULL || cell->u[HAPI_PASS_POSES] > count_published(player, HAPI_CHANNEL_POSES) ||
       cell->u[HAPI_PASS_NEAR] > count_published(player, HAPI_CHANNEL_NEAR)) {
     return play_contradicts(player, "a contact pass took a message that comes later", detail);
   }

@@ -106,7 +106,7 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
     return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
   hap_detail detail = {""};
-  hapi_pointer_setup setup;
+  hapi_pointer_setup setup = {0};
   out->v = 0;
   hap_status status = hapi_session_read_pointer(def, &setup, &detail);
   if (status >= HAP_OK && hapi_coupling_has_spring(setup.coupling) &&
