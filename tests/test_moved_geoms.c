@@ -317,7 +317,7 @@ TEST(a_geom_is_felt_as_a_body_is)
     }
   }
   moved_case c = {.hz = 20.0, .model = HAP_MODEL_CONTACT, .way = way_swing};
-  same_as_body(&c, 800); /* a body that moves from the start on has no past, and a geom has */
+  same_as_body(&c, 0);
 }
 
 TEST(geoms_of_all_kinds_are_felt_as_bodies_are)

@@ -166,9 +166,10 @@ void hapi_course_note(hapi_course_past *past, const hap_pose *pose, const hap_tw
   memcpy(past->set, now, sizeof now);
 }
 
-void hapi_course_stand(hapi_course_past *past, const hap_pose *pose, double seconds)
+void hapi_course_stand(hapi_course_past *past, const hap_pose *pose, double seconds, uint32_t syncs)
 {
-  *past = (hapi_course_past){.known = true, .count = ORDERS, .seconds = seconds, .place = *pose};
+  *past = (hapi_course_past){
+      .known = true, .count = syncs < ORDERS ? syncs : ORDERS, .seconds = seconds, .place = *pose};
 }
 
 /* The lowest order, beginning with one, that has missed about as little as the best. */

@@ -123,7 +123,7 @@ static void fill_course(const publishing *p, const hapi_known_body *known, hapi_
   double period = p->cycle->probe_step_s;
   double scale = p->cycle->time_scale;
   if (way != NULL && way->fresh) {
-    hapi_course_stand(&of->course, &way->before, period);
+    hapi_course_stand(&of->course, &way->before, period, way->stood);
   } else if (way != NULL && !of->course.known) {
     hapi_course_note(&of->course, &way->before, &out->twist, 0.0);
   }

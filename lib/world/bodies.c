@@ -261,6 +261,7 @@ static void see_loose_geom(hapi_world *world, const hapi_cycle *cycle, dGeomID g
     hapi_carriers_place(&world->carriers, geom);
     hapi_extent_follow_way(carrier, cycle->step_s);
     carrier->rest->way.fresh = true;
+    carrier->rest->way.stood = met.stood;
     table->fastest = fmax(table->fastest, hapi_extent_speed(carrier));
   }
 }

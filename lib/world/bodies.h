@@ -41,6 +41,7 @@ typedef struct hapi_mark {
 /* How a kinematic body went that the application moves by its pose alone. */
 typedef struct hapi_posed_way {
   bool fresh;      /* a carrier that began at the last sync: it was static before */
+  uint32_t stood;  /* likewise: syncs that it had been there */
   hap_pose place;  /* at the last sync */
   hap_pose before; /* at the one before it */
   hap_twist rate;  /* between them */

@@ -232,12 +232,16 @@ static void loose_follow(hapi_carriers *carriers, hapi_loose_geom *loose, bool m
       carrier_begin(carriers, loose);
     }
     memcpy(loose->place, place, sizeof place);
+    out->stood = loose->stands;
     loose->stands = 0;
     if (!out->is_new) {
       carrier_place(loose);
     }
-  } else if (loose->carrier != NULL && ++loose->stands > STANDS_MOST && may_end) {
-    carrier_end(carriers, loose);
+  } else {
+    loose->stands += loose->stands <= STANDS_MOST;
+    if (loose->carrier != NULL && loose->stands > STANDS_MOST && may_end) {
+      carrier_end(carriers, loose);
+    }
   }
 }
 
@@ -246,7 +250,7 @@ bool hapi_carriers_meet(hapi_carriers *carriers, dGeomID geom, uint64_t scan, bo
 {
   int kind = dGeomGetClass(geom);
   uint32_t index = find_next(carriers, geom);
-  *out = (hapi_carrier_meeting){NULL, false};
+  *out = (hapi_carrier_meeting){NULL, false, 0};
   if (index == HAPI_INDEX_NONE && !entry_add(carriers, geom, &index)) {
     return false;
   }
@@ -258,6 +262,7 @@ bool hapi_carriers_meet(hapi_carriers *carriers, dGeomID geom, uint64_t scan, bo
   if (loose->kind != kind) { /* it is new, or another one */
     carrier_end(carriers, loose);
     loose->kind = kind;
+    loose->stands = 0;
     place_read(geom, loose->place);
   } else if (carriers->syncs) {
     loose_follow(carriers, loose, may_end, out);

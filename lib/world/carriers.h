@@ -24,7 +24,7 @@ typedef struct hapi_loose_geom {
   dBodyID carrier;                 /* NULL: it has not moved */
   uint64_t seen;                   /* scan that found it */
   uint32_t next;                   /* entry that the last scan saw after it; a guess */
-  uint32_t stands;                 /* syncs since it moved */
+  uint32_t stands;                 /* syncs since it moved, or was met first */
   int kind;                        /* class of the geom; -1: the application has forgotten it */
   double place[HAPI_GEOM_NUMBERS]; /* at the last sync */
   double turn_back[4];             /* from the orientation in which its carrier began */
@@ -49,8 +49,9 @@ void hapi_carriers_reset(hapi_carriers *carriers);
 
 /* What a scan met. */
 typedef struct hapi_carrier_meeting {
-  dBodyID body; /* NULL: the geom has none */
-  bool is_new;  /* the body is still where the geom was at the last sync */
+  dBodyID body;   /* NULL: the geom has none */
+  bool is_new;    /* the body is still where the geom was at the last sync */
+  uint32_t stood; /* syncs that the geom has been there */
 } hapi_carrier_meeting;
 
 /* syncs: once in a cycle; what has moved counts then. */
