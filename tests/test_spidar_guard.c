@@ -55,18 +55,23 @@ static rig *rig_new(void)
   return r;
 }
 
-static bool rig_start(rig *r, double stall_s)
+static bool rig_start_at(rig *r, const char *path, double stall_s)
 {
   static const hapi_spidar_identity unknown = {.usb = false};
   static const hapi_spidar_boards boards = {.count = 0};
   const hapi_spidar_guard_def def = {.port = r->port,
-                                     .path = "/no/such/port",
+                                     .path = path,
                                      .identity = &unknown,
                                      .boards = &boards,
                                      .zeros = r->zeros,
                                      .zero_count = ZEROS,
                                      .stall_s = stall_s};
   return hapi_spidar_guard_start(&r->guard, &def);
+}
+
+static bool rig_start(rig *r, double stall_s)
+{
+  return rig_start_at(r, "/no/such/port", stall_s);
 }
 
 /* Whole rounds of zeros that come until nothing has come for quiet_ms, or the port is closed. */
@@ -281,6 +286,28 @@ TEST(it_keeps_nothing_else_of_the_program_open)
   hapi_spidar_guard_end(&r->guard, true);
   CHECK(descriptors_of(getpid()) == before - 1);
   CHECK(guard_ends(guard));
+}
+
+/* Its name is the next one's, and that may be a person's shell. */
+TEST(a_pseudo_terminal_is_not_waited_for)
+{
+  static const char *const paths[] = {"/no/such/port", "/dev/pts/1000000"};
+  for (int i = 0; i < 2; ++i) {
+    rig *r = rig_new();
+    REQUIRE(rig_start_at(r, paths[i], STALL_S));
+    pid_t guard = guard_await();
+    REQUIRE(guard > 0);
+    close(r->board); /* the other end of the port is gone */
+    r->board = open("/dev/null", O_RDWR | O_CLOEXEC);
+    hapi_spidar_guard_end(&r->guard, false);
+    hapi_clock_sleep_until(hapi_clock_now() + 300000000);
+    bool waits = waitpid(guard, NULL, WNOHANG) == 0;
+    CHECK(waits == (i == 0));
+    if (waits) {
+      kill(guard, SIGKILL);
+      CHECK(waitpid(guard, NULL, 0) == guard);
+    }
+  }
 }
 
 TEST(no_process_no_guard)

@@ -156,6 +156,13 @@ static void port_lose(watch *w)
   file_drop(&w->port);
 }
 
+/* The kernel gives the name of a pseudo-terminal to the next one, which may be a person's shell. */
+static bool port_can_return(const watch *w)
+{
+  static const char pseudo[] = "/dev/pts/";
+  return w->def.identity->usb || strncmp(w->def.path, pseudo, sizeof pseudo - 1) != 0;
+}
+
 /* Zero for a port that is there again. An adapter that is known by sysfs is zeroed at once. Else
  * the name alone is known, which may be another machine's: its boards are asked first. */
 static void port_rescue(watch *w)
@@ -246,11 +253,11 @@ static void guard_main(watch *w)
     }
     if (w->port >= 0) {
       look_at_pulse(w, &beats, &looks);
-    } else if (!w->rescued) {
+    } else if (!w->rescued && port_can_return(w)) {
       port_rescue(w);
     }
     waits += waits > 0;
-    if (waits > 0 && (w->rescued || waits > WAIT_LOOKS)) {
+    if (waits > 0 && (w->rescued || !port_can_return(w) || waits > WAIT_LOOKS)) {
       return;
     }
   }
