@@ -13,15 +13,17 @@
 
 #define REFERENCE_HZ 2000.0
 
+#define TICK_HZ (1.0 / FAULTS_TICK_S)
 #define TOUCH_N 0.05 /* of the first contact */
 #define JOINT_OPEN_MAX 1e-3
 
 /* Of a run against the reference, while either pushes. */
 typedef struct comparison {
-  double error; /* RMS of the difference / RMS of the reference */
-  double jump;  /* N, largest change from tick to tick */
-  double peak;  /* N */
-  double shift; /* s, by which the first contact is late */
+  double error;  /* RMS of the difference / RMS of the reference */
+  double jump;   /* N, largest change from tick to tick */
+  double peak;   /* N */
+  double shift;  /* s, by which the first contact is late */
+  double ticked; /* as error, against the reference at the tick's rate; 0: not asked for */
   bool good;
 } comparison;
 
@@ -34,7 +36,8 @@ typedef struct arrival {
 
 typedef struct references {
   faults_run run;
-  faults_run half; /* at half the step */
+  faults_run half;   /* at half the step */
+  faults_run ticked; /* at the tick's rate, of a scene that begins hard */
   comparison own;
   double floor;
 } references;
@@ -162,6 +165,20 @@ static bool spread_measure(const faults_scene *scene, double rate, references *i
   return true;
 }
 
+/* A tick sees a first touch at its next begin. Which tick that is, half a step of the reference can
+ * decide, and one sample of full force is the difference. */
+static bool ticked_measure(const faults_scene *scene, references *io)
+{
+  comparison c;
+  if (!faults_reference_run(scene, TICK_HZ, &io->ticked)) {
+    return false;
+  }
+  run_limit(scene, &io->ticked);
+  run_compare(scene, &io->half, &io->ticked, &c);
+  io->floor = fmax(io->floor, c.error);
+  return true;
+}
+
 static bool references_make(bench *b, const faults_scene *scene, references *out)
 {
   memset(out, 0, sizeof *out);
@@ -181,7 +198,8 @@ static bool references_make(bench *b, const faults_scene *scene, references *out
   run_compare(scene, &out->half, &out->half, &out->own);
   out->floor =
       scene->check.kind == FAULTS_FEEDBACK ? told_error(scene, &out->half, &out->run) : half.error;
-  if (scene->check.spreads && !spread_measure(scene, 2.0 * rate, out)) {
+  if ((scene->check.spreads && !spread_measure(scene, 2.0 * rate, out)) ||
+      (scene->check.begins_hard && !ticked_measure(scene, out))) {
     (void)bench_fail(b, HAP_ERROR_MEMORY, "no memory for the reference of %s", scene->name);
     return false;
   }
@@ -192,6 +210,16 @@ static void references_free(references *r)
 {
   faults_run_free(&r->run);
   faults_run_free(&r->half);
+  faults_run_free(&r->ticked);
+}
+
+static double ticked_error(const faults_scene *scene, const references *r, const faults_run *run)
+{
+  comparison c = {.error = 0.0};
+  if (scene->check.begins_hard) {
+    run_compare(scene, &r->ticked, run, &c);
+  }
+  return c.error;
 }
 
 /* Whether the scene is as good as it has to be. io_error: what of the kind is judged. */
@@ -223,7 +251,7 @@ static bool run_judge(const faults_scene *scene, double hz, const references *r,
       arrival_compare(&r->half, run, io);
       return io->error <= bound && fabs(io->shift) <= fmax(2e-3, 0.1 / hz);
     case FAULTS_FORCE:
-      return io->error <= fmax(bound, 2.0 * r->floor) && is_calm &&
+      return io->error <= fmax(bound, 2.0 * r->floor) && io->ticked <= bound && is_calm &&
              run->joint_open <= fmax(JOINT_OPEN_MAX, 2.0 * r->half.joint_open);
   }
   return false;
@@ -245,6 +273,8 @@ static void row_say(const faults_scene *scene, double hz, const references *r,
   } else if (run->joint_open > 0.0) {
     snprintf(more, sizeof more, "joints open %.2f mm of %.2f  ", 1e3 * run->joint_open,
              1e3 * r->half.joint_open);
+  } else if (scene->check.begins_hard) {
+    snprintf(more, sizeof more, "%.3f %% of the same rate  ", 100.0 * c->ticked);
   } else if (scene->check.kind == FAULTS_CAPACITY) {
     snprintf(more, sizeof more, "%lu dropped, %lu lines  ", run->dropped, run->said);
   }
@@ -261,8 +291,8 @@ static void row_write(FILE *csv, const faults_scene *scene, double hz, const ref
   fprintf(csv, "%d,%s,%g,%s,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,", scene->item, scene->name, hz,
           kind_name(scene->check.kind), c->error, r->floor, c->jump, r->own.jump, c->peak,
           r->own.peak, scene->check.bound);
-  fprintf(csv, "%s,%.3g,%.3g,%lu,%lu\n", c->good ? "ok" : "FAULT", 1e3 * c->shift,
-          1e3 * run->joint_open, run->dropped, run->said);
+  fprintf(csv, "%s,%.3g,%.3g,%lu,%lu,%.6g\n", c->good ? "ok" : "FAULT", 1e3 * c->shift,
+          1e3 * run->joint_open, run->dropped, run->said, c->ticked);
 }
 
 /* Of a scene that was asked for alone: all forces. */
@@ -292,6 +322,7 @@ static hap_status scene_measure(bench *b, const faults_scene *scene, FILE *csv, 
     status = faults_session_run(b, scene, rates[i], &run);
     if (status >= HAP_OK) {
       run_compare(scene, &r.half, &run, &c);
+      c.ticked = ticked_error(scene, &r, &run);
       c.good = run_judge(scene, rates[i], &r, &run, &c);
       *io_faults += !c.good;
       b->off += b->verify && !c.good;
@@ -317,7 +348,8 @@ hap_status bench_faults(bench *b)
   FILE *trace = NULL;
   FILE *csv = bench_csv_open(b, "faults",
                              "item,scene,hz,measure,error,floor,jump_n,jump_reference_n,peak_n,"
-                             "peak_reference_n,bound,verdict,shift_ms,joint_open_mm,dropped,said");
+                             "peak_reference_n,bound,verdict,shift_ms,joint_open_mm,dropped,said,"
+                             "error_same_rate");
   if (csv != NULL && b->scene != NULL) {
     trace = bench_csv_open(b, "faults_trace", "hz,t,fx,fy,fz,ref_fx,ref_fy,ref_fz,told,ref_told");
   }

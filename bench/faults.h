@@ -111,6 +111,9 @@ typedef struct faults_check {
   /* statically indeterminate: the floor is also that of the other order of bodies, and of twice the
    * iterations */
   bool spreads;
+  /* pushes hard from its first touch, which is somewhere between two ticks: the floor is also that
+   * of the reference at the tick's rate, and the session is compared with that one too */
+  bool begins_hard;
 } faults_check;
 
 typedef struct faults_scene {

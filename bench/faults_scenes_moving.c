@@ -165,9 +165,9 @@ static void height_read(faults_world *w, double begin, double end)
   w->told = dBodyGetPosition(w->bodies[0])[2];
 }
 
-#define DRIVEN                                                   \
-  {                                                              \
-    .kind = FAULTS_FORCE, .bound = 0.05, .reference_hz = 16000.0 \
+#define DRIVEN                                                                        \
+  {                                                                                   \
+    .kind = FAULTS_FORCE, .bound = 0.05, .reference_hz = 16000.0, .begins_hard = true \
   }
 #define ARRIVES                                                    \
   {                                                                \
