@@ -41,9 +41,44 @@ static void rig_end(void *self)
   close(r->board);
 }
 
+/* The guard's process; 0: there is none. It is a child of this one, who reaps orphans. */
+static pid_t guard_process(void)
+{
+  pid_t found = 0;
+  DIR *folder = opendir("/proc");
+  REQUIRE(folder != NULL);
+  for (struct dirent *entry = readdir(folder); entry != NULL; entry = readdir(folder)) {
+    char path[300];
+    char name[40] = "";
+    char state = 'Z';
+    int parent = 0;
+    snprintf(path, sizeof path, "/proc/%.100s/stat", entry->d_name);
+    FILE *file = fopen(path, "r");
+    if (file != NULL && fscanf(file, "%*d (%39[^)]) %c %d", name, &state, &parent) == 3 &&
+        parent == (int)getpid() && state != 'Z' && strcmp(name, "spidar-guard") == 0) {
+      found = (pid_t)atoi(entry->d_name);
+    }
+    if (file != NULL) {
+      fclose(file);
+    }
+  }
+  closedir(folder);
+  return found;
+}
+
+/* Those of earlier tests end on their own, and must not be taken for the next one. */
+static bool guards_have_ended(void)
+{
+  for (int ms = 0; ms < PATIENCE_MS && guard_process() != 0; ms += 5) {
+    hapi_clock_sleep_until(hapi_clock_now() + 5000000);
+  }
+  return guard_process() == 0;
+}
+
 static rig *rig_new(void)
 {
   int ends[2];
+  REQUIRE(guards_have_ended());
   rig *r = tap_own(sizeof *r, rig_end);
   REQUIRE(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0);
   r->port = ends[0];
@@ -101,31 +136,6 @@ static bool is_quiet(const rig *r, int ms)
 {
   struct pollfd ready = {r->board, POLLIN, 0};
   return poll(&ready, 1, ms) == 0;
-}
-
-/* The guard's process; 0: there is none. It is a child of this one, who reaps orphans. */
-static pid_t guard_process(void)
-{
-  pid_t found = 0;
-  DIR *folder = opendir("/proc");
-  REQUIRE(folder != NULL);
-  for (struct dirent *entry = readdir(folder); entry != NULL; entry = readdir(folder)) {
-    char path[300];
-    char name[40] = "";
-    char state = 'Z';
-    int parent = 0;
-    snprintf(path, sizeof path, "/proc/%.100s/stat", entry->d_name);
-    FILE *file = fopen(path, "r");
-    if (file != NULL && fscanf(file, "%*d (%39[^)]) %c %d", name, &state, &parent) == 3 &&
-        parent == (int)getpid() && state != 'Z' && strcmp(name, "spidar-guard") == 0) {
-      found = (pid_t)atoi(entry->d_name);
-    }
-    if (file != NULL) {
-      fclose(file);
-    }
-  }
-  closedir(folder);
-  return found;
 }
 
 static pid_t guard_await(void)
