@@ -199,7 +199,8 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     double rubs = c->mu > 0.0 ? hapi_friction_energy(touches, tick, c) : 0.0;
     gone -= r->sprung;
     if (share != r->felt_share || r->excess != r->felt_excess) { /* seldom */
-      double excess = r->late ? r->excess : r->felt_excess;
+      /* Over a jump the hand paid for no depth, so none of it is lost. */
+      double excess = r->late || p->device.jumped ? r->excess : r->felt_excess;
       sum += energy - spring_energy(p, c->weight * r->felt_share, r->depth - excess);
       sum +=
           (p->guard.felt - r->felt) * rubs; /* a deep contact's friction comes in with its limit */
