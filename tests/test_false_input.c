@@ -66,7 +66,7 @@ TEST(a_spidar_that_tells_what_is_false)
 {
   static const false_input_kind kinds[] = {FALSE_ONE_SPIKES, FALSE_ALL_SPIKES, FALSE_SINGLE,
                                            FALSE_ONE_STUCK,  FALSE_ONE_DRIFTS, FALSE_BOARD_STUCK,
-                                           FALSE_ALWAYS};
+                                           FALSE_ALL_STUCK,  FALSE_ALL_ALWAYS, FALSE_ALWAYS};
   false_input_def def;
   false_input_init(&def);
   for (int row = 0; row < 2; ++row) {
@@ -79,12 +79,13 @@ TEST(a_spidar_that_tells_what_is_false)
 TEST(a_virtual_device_that_tells_what_is_false)
 {
   static const false_input_kind kinds[] = {FALSE_ONE_SPIKES, FALSE_ALL_SPIKES, FALSE_SINGLE,
+                                           FALSE_ONE_STUCK,  FALSE_ONE_DRIFTS, FALSE_BOARD_STUCK,
                                            FALSE_OLD,        FALSE_ALWAYS,     FALSE_ALL_ALWAYS};
-  static const double rates[] = {1000.0, 5000.0};
+  static const double rates[] = {1000.0, 5000.0, 10000.0};
   false_input_def def;
   false_input_init(&def);
   def.device = FALSE_INPUT_VIRTUAL;
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < 3; ++i) {
     def.haptic_hz = rates[i];
     look_at_all(&def, kinds, sizeof kinds / sizeof kinds[0]);
   }
@@ -92,13 +93,15 @@ TEST(a_virtual_device_that_tells_what_is_false)
 
 TEST(a_device_that_is_slow_to_tell_is_believed)
 {
+  static const false_input_kind kinds[] = {FALSE_ONE_SPIKES, FALSE_ALL_SPIKES, FALSE_ALWAYS,
+                                           FALSE_ALL_ALWAYS};
   static const double rates[] = {1000.0, 5000.0, 10000.0};
   false_input_def def;
   false_input_init(&def);
   def.device = FALSE_INPUT_COARSE;
   for (int i = 0; i < 3; ++i) {
     def.haptic_hz = rates[i];
-    look_at_all(&def, NULL, 0);
+    look_at_all(&def, kinds, sizeof kinds / sizeof kinds[0]);
   }
 }
 
@@ -125,6 +128,15 @@ static bool hand_tell(double x, int64_t after_ns)
   return hapi_input_judge(&hand, hand_ns, false);
 }
 
+/* At rest for so long, at 0. */
+static void hand_rest(int per_ms, int64_t ns)
+{
+  hand_begin();
+  while (hand_ns < ns) {
+    CHECK(hand_tell(0.0, MS / per_ms));
+  }
+}
+
 static double hand_x(void)
 {
   return hand.device.pose.position[0];
@@ -148,23 +160,17 @@ TEST(the_bound_is_that_of_a_hand)
 {
   const double most = HAPI_SAFETY_ACCELERATION_LIMIT * 1e-6; /* m, in the first ms */
   CHECK_NEAR(most, 0.5e-3, 1e-9);
-  hand_begin();
-  CHECK(hand_tell(0.0, MS) && hand_tell(0.0, MS) && hand_tell(0.95 * most, MS));
-  hand_begin();
-  CHECK(hand_tell(0.0, MS) && hand_tell(0.0, MS) && !hand_tell(1.05 * most, MS));
-  hand_begin(); /* at another rate as well */
-  for (int i = 0; i < 10; ++i) {
-    CHECK(hand_tell(0.0, MS / 10));
-  }
+  hand_rest(1, 25 * MS);
+  CHECK(hand_tell(0.95 * most, MS));
+  hand_rest(1, 25 * MS);
+  CHECK(!hand_tell(1.05 * most, MS));
+  hand_rest(10, 25 * MS); /* at another rate as well */
   CHECK(!hand_tell(1.05 * most, MS / 10));
 }
 
 TEST(a_device_that_jumped_is_believed_after_some_ms)
 {
-  hand_begin();
-  for (int i = 0; i < 20; ++i) {
-    CHECK(hand_tell(0.0, MS));
-  }
+  hand_rest(1, 25 * MS);
   int64_t held = hand_ns;
   while (hand_ns - held < 50 * MS && !hand_tell(0.05 + 1e-4 * (double)(hand_ns - held) / MS, MS)) {
     CHECK(hand_x() == 0.0 && !hand.belief.jumped);
@@ -176,10 +182,7 @@ TEST(a_device_that_jumped_is_believed_after_some_ms)
 
 TEST(noise_fades_and_is_told_within_20_ms)
 {
-  hand_begin();
-  for (int i = 0; i < 20; ++i) {
-    CHECK(hand_tell(0.0, MS));
-  }
+  hand_rest(1, 25 * MS);
   int64_t begun = hand_ns;
   double before = 0.0;
   for (int i = 0; hand.belief.loss < 1.0 && i < 100; ++i) {
@@ -250,35 +253,113 @@ TEST(devices_that_tell_seldom)
   }
 }
 
-static void hand_play(const char *path, const char *name)
+/* A recording: times [s] and places. */
+typedef struct recorded {
+  int rows;
+  double t[12000];
+  double x[12000][3];
+} recorded;
+
+static recorded played;
+
+static void recording_load(const char *path)
 {
   FILE *file = fopen(path, "r");
   char line[512];
-  int rows = 0;
-  int refused = 0;
-  hand_begin();
   REQUIRE(file != NULL);
-  double t = -1.0;
-  double x[3] = {0.0, 0.0, 0.0};
-  while (fgets(line, sizeof line, file) != NULL) {
-    double next;
-    double at[3];
-    if (sscanf(line, "%lf,%lf,%lf,%lf", &next, &at[0], &at[1], &at[2]) != 4) {
-      continue;
-    }
-    for (; t >= 0.0 && t < next - 1e-9; t += 1e-3) { /* held at 1 kHz until the next one */
-      hand_ns += MS;
-      hapi_v3_copy(x, hand.device.pose.position);
-      refused += !hapi_input_judge(&hand, hand_ns, false);
-      CHECK(hand.belief.loss < 1.0);
-    }
-    t = t < 0.0 ? next : t;
-    hapi_v3_copy(at, x);
-    ++rows;
+  played.rows = 0;
+  while (fgets(line, sizeof line, file) != NULL && played.rows < 12000) {
+    double *x = played.x[played.rows];
+    played.rows +=
+        sscanf(line, "%lf,%lf,%lf,%lf", &played.t[played.rows], &x[0], &x[1], &x[2]) == 4;
   }
   fclose(file);
-  printf("# %s: %d rows, %d ticks refused\n", name, rows, refused);
-  CHECK(rows > 100 && refused <= rows / 200);
+  REQUIRE(played.rows > 100);
+}
+
+/* By cubics through the rows; *io_row goes on with the time. */
+static void recording_at(double t, int *io_row, double out[3])
+{
+  while (*io_row < played.rows - 3 && played.t[*io_row + 1] <= t) {
+    ++*io_row;
+  }
+  int i = *io_row > 0 ? *io_row : 1;
+  double h = played.t[i + 1] - played.t[i];
+  double u = (t - played.t[i]) / h;
+  for (int k = 0; k < 3; ++k) {
+    double slope[2];
+    for (int side = 0; side < 2; ++side) {
+      int at = i + side;
+      slope[side] =
+          h * (played.x[at + 1][k] - played.x[at - 1][k]) / (played.t[at + 1] - played.t[at - 1]);
+    }
+    double a = played.x[i][k];
+    double c = played.x[i + 1][k] - a;
+    out[k] = a + u * (slope[0] + u * ((3.0 * c - 2.0 * slope[0] - slope[1]) +
+                                      u * (slope[0] + slope[1] - 2.0 * c)));
+  }
+}
+
+/* What a device makes of a hand. */
+typedef struct told_how {
+  double hz;
+  double every_s; /* between new positions */
+  double quantum; /* m */
+  double noise;   /* m, to either side */
+} told_how;
+
+static double dice_throw(uint32_t *io)
+{
+  *io = *io * 1664525u + 1013904223u;
+  return (double)(*io >> 8) / 8388608.0 - 1.0;
+}
+
+/* Ticks that were not believed. */
+static int hand_play(const told_how *how, double seconds)
+{
+  int refused = 0;
+  int row = 0;
+  uint32_t seed = 7;
+  double x[3] = {0.0, 0.0, 0.0};
+  double told = -1.0;
+  double begin = played.t[1];
+  double end = hapi_min(played.t[played.rows - 3], begin + seconds);
+  hand_begin();
+  hand.velocity.quantum = how->quantum;
+  for (int64_t tick = 0;; ++tick) {
+    double t = begin + (double)tick / how->hz;
+    if (t > end) {
+      return refused;
+    }
+    hand_ns = (int64_t)(1e9 * (double)tick / how->hz);
+    if (told < 0.0 || t - told > how->every_s - 1e-7) {
+      recording_at(t, &row, x);
+      for (int k = 0; k < 3; ++k) {
+        x[k] += how->noise * dice_throw(&seed);
+        x[k] = how->quantum > 0.0 ? how->quantum * round(x[k] / how->quantum) : x[k];
+      }
+      told = t;
+    }
+    hapi_v3_copy(x, hand.device.pose.position);
+    refused += !hapi_input_judge(&hand, hand_ns, false);
+  }
+}
+
+/* At every rate, resolution and period not one pose is refused. */
+static void recording_play(const char *name)
+{
+  static const double rates[] = {1000.0, 4000.0, 10000.0};
+  static const double quanta[] = {0.0, 1e-6, 1e-5, 3e-5, 1e-4};
+  static const double periods[] = {0.0, 1e-3, 2e-3, 4e-3};
+  for (int i = 0; i < 60; ++i) {
+    told_how how = {rates[i / 20], periods[i / 5 % 4], quanta[i % 5], 0.0};
+    for (int noisy = 0; noisy < 2; ++noisy) {
+      how.noise = noisy != 0 ? 0.5 * quanta[i % 5] + 5e-6 : 0.0;
+      int refused = hand_play(&how, 8.0);
+      CHECK_SAY(refused == 0, "%s, %g Hz, new every %g ms, %g um, noise %g um: %d refused", name,
+                how.hz, 1e3 * how.every_s, 1e6 * how.quantum, 1e6 * how.noise, refused);
+    }
+  }
 }
 
 TEST(recorded_hands_are_believed)
@@ -295,7 +376,8 @@ TEST(recorded_hands_are_believed)
     char path[1400];
     if (strstr(entry->d_name, ".csv") != NULL) {
       snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
-      hand_play(path, entry->d_name);
+      recording_load(path);
+      recording_play(entry->d_name);
     }
   }
   closedir(files);

@@ -24,10 +24,20 @@
 #define HAPI_SAFETY_CARRY_SPIN 10.0          /* rad/s */
 #define HAPI_SAFETY_SPIN_CHANGE 50.0         /* rad/s */
 #define HAPI_SAFETY_CONFIRM_S 0.003          /* s */
-#define HAPI_SAFETY_JUMP_LEAST 0.003         /* m */
+#define HAPI_SAFETY_JUMP_LEAST 0.0005        /* m */
 #define HAPI_SAFETY_DOUBT_FADE_S 0.014       /* s */
 #define HAPI_SAFETY_UNEXPLAINED_S 0.03       /* s */
 #define HAPI_SAFETY_MISFIT_S 0.3             /* s */
+#define HAPI_SAFETY_JUDGE_S 1e-3             /* s */
+#define HAPI_SAFETY_QUANTA 3.0               /* 1 */
+#define HAPI_SAFETY_STEP_LEAST 2e-5          /* m */
+#define HAPI_SAFETY_GAP_MOST_S 0.02          /* s */
+#define HAPI_SAFETY_REST_GAPS 2.0            /* 1 */
+#define HAPI_SAFETY_UNREAD_S 0.02            /* s */
+#define HAPI_SAFETY_DOUBT_FORGET 0.25        /* 1 */
+#define HAPI_SAFETY_STRING_SHARE 2.0         /* 1 */
+#define HAPI_SAFETY_STALE_QUANTA 6.0         /* 1 */
+#define HAPI_SAFETY_SILENCE_S 0.01           /* s */
 
 /* ---- how fast force comes and goes ---- */
 #define HAPI_SAFETY_SLEW_S 0.002     /* s */

@@ -10,7 +10,8 @@
 
 /* A hand has a bounded acceleration. So a device is near the line from where it was to where it
  * would be at its velocity: within what the largest change of velocity makes in the time since the
- * newest position. What is farther off is false, or the device really jumped: an encoder slipped,
+ * newest position. At high rates the line begins some ticks ago: the bound of 1 ms is not one for
+ * each tick. What is farther off is false, or the device really jumped: an encoder slipped,
  * somebody pushed it. The two differ by what comes next.
  *
  *   false  The next positions are where the line is. Meanwhile the device is carried on, then held.
@@ -22,15 +23,6 @@
  * Time between positions is what counts, not the tick: some devices tell the same position for
  * several ticks. They are known by the time before each change of more than some quanta; the
  * shortest of the newest ones counts, as a device that rested looks the same once. */
-
-#define QUANTA 3.0      /* by which a difference of differences may be rounded */
-#define STEP_LEAST 2e-5 /* m: less is no step of a device that is slow to tell */
-#define GAP_MOST_S 0.02 /* between two positions */
-#define STOOD_S 0.02    /* after a longer time without a read nothing is known of the way */
-#define TICK_S 1e-3     /* the bound is of this time at least: noise is the same at any rate */
-#define REST 2.0        /* gaps without a new position: it stands still */
-#define VELOCITY_S 2e-3 /* time constant of the velocity that the line has */
-#define FORGET 0.25     /* s of doubt that a second without any takes away */
 
 static double seconds_between(int64_t from_ns, int64_t to_ns)
 {
@@ -50,12 +42,14 @@ static double turn_between(const double a[4], const double b[4])
 }
 
 /* Off the line, after some time without another pose. In a ms a hand may hit something; for longer
- * it is the hand alone that accelerates. */
-static double way_most(const hapi_pointer *p, double seconds)
+ * it is the hand alone that accelerates. The acceleration may have begun at any time since the pose
+ * before, but what had begun was seen: the newest pose was off its own line already. */
+static double way_most(const hapi_pointer *p, double seconds, double off_before)
 {
-  double hit = HAPI_SAFETY_ACCELERATION_LIMIT * TICK_S * TICK_S;
+  double hit = HAPI_SAFETY_ACCELERATION_LIMIT * HAPI_SAFETY_JUDGE_S * HAPI_SAFETY_JUDGE_S;
   double swing = HAPI_SAFETY_SWING_LIMIT * seconds * seconds;
-  return hapi_max(hit, swing) + QUANTA * p->velocity.quantum;
+  double begun = sqrt(off_before + p->velocity.quantum) + sqrt(0.5 * swing);
+  return hapi_max(hit, hapi_min(begun * begun, swing)) + HAPI_SAFETY_QUANTA * p->velocity.quantum;
 }
 
 /* How far a place is from the way that begins at from and takes so long. */
@@ -85,27 +79,27 @@ static double gap_of(const hapi_pointer_belief *b)
 
 static double gap_or_tick(const hapi_pointer_belief *b)
 {
-  return hapi_max(gap_of(b), TICK_S);
+  return hapi_max(gap_of(b), HAPI_SAFETY_JUDGE_S);
 }
 
 static bool pose_is_plausible(const hapi_pointer *p, int64_t now_ns)
 {
   const hapi_pointer_belief *b = &p->belief;
   const hap_pose *pose = &p->device.pose;
-  double passed = seconds_between(b->sample_ns, now_ns);
+  double passed = seconds_between(b->line_ns, now_ns);
   double tick = seconds_between(b->read_ns, now_ns);
   double time = hapi_min(passed, hapi_max(gap_of(b), tick));
   double way[3];
-  hapi_v3_sub(pose->position, b->told.position, way);
+  hapi_v3_sub(pose->position, b->line.position, way);
   /* What is told now may be of any time in the last tick. */
-  bool off =
-      off_way(b->told.position, b->velocity, passed + tick, pose->position) > way_most(p, time);
-  if (hapi_v3_norm(way) > HAPI_SAFETY_SPEED_LIMIT * hapi_max(passed, TICK_S)) {
+  bool off = off_way(b->line.position, b->velocity, passed + tick, pose->position) >
+             way_most(p, time, b->off);
+  if (hapi_v3_norm(way) > HAPI_SAFETY_SPEED_LIMIT * hapi_max(passed, HAPI_SAFETY_JUDGE_S)) {
     return false;
   }
-  bool turned =
-      pointer_turns(p) && turn_between(pose->quat_wxyz, b->told.quat_wxyz) >
-                              b->spin * passed + HAPI_SAFETY_SPIN_CHANGE * hapi_max(time, TICK_S);
+  bool turned = pointer_turns(p) && turn_between(pose->quat_wxyz, b->line.quat_wxyz) >
+                                        b->spin * passed + HAPI_SAFETY_SPIN_CHANGE *
+                                                               hapi_max(time, HAPI_SAFETY_JUDGE_S);
   return !b->paced || (!off && !turned);
 }
 
@@ -118,9 +112,15 @@ static bool is_news(const hapi_pointer *p)
           memcmp(pose->quat_wxyz, told->quat_wxyz, sizeof pose->quat_wxyz) != 0);
 }
 
+/* The first gap stands for all, unless the device rested before. */
 static void gap_note(hapi_pointer_belief *b, double seconds)
 {
-  b->gaps[b->gap_at] = hapi_min(seconds, GAP_MOST_S);
+  if (!(gap_of(b) > 0.0) && seconds < HAPI_SAFETY_GAP_MOST_S) {
+    for (int i = 0; i < HAPI_BELIEF_GAPS; ++i) {
+      b->gaps[i] = seconds;
+    }
+  }
+  b->gaps[b->gap_at] = hapi_min(seconds, HAPI_SAFETY_GAP_MOST_S);
   b->gap_at = (b->gap_at + 1) % HAPI_BELIEF_GAPS;
 }
 
@@ -129,9 +129,9 @@ static bool goes_on(const hapi_pointer *p, const double way[3], double tick)
 {
   const hapi_elsewhere *e = &p->belief.elsewhere;
   const hap_pose *pose = &p->device.pose;
-  double time = hapi_max(e->since, TICK_S);
+  double time = hapi_max(e->since, HAPI_SAFETY_JUDGE_S);
   bool near = e->moved ? off_way(e->pose.position, e->velocity, e->since + tick, pose->position) <=
-                             way_most(p, e->since)
+                             way_most(p, e->since, e->since * e->since * HAPI_SAFETY_SWING_LIMIT)
                        : hapi_v3_norm(way) <= HAPI_SAFETY_SPEED_LIMIT * time;
   return near && (!pointer_turns(p) || turn_between(pose->quat_wxyz, e->pose.quat_wxyz) <=
                                            HAPI_SAFETY_SPIN_LIMIT * time);
@@ -178,25 +178,43 @@ static bool follow_elsewhere(hapi_pointer *p, double seconds, int64_t now_ns)
   return true;
 }
 
-/* At a new place, which the device told after so long. */
+/* The line goes on from here. */
+static void line_take(hapi_pointer *p, int64_t now_ns)
+{
+  hapi_pointer_belief *b = &p->belief;
+  double passed = seconds_between(b->line_ns, now_ns);
+  double way[3];
+  hapi_v3_sub(p->device.pose.position, b->line.position, way);
+  hapi_v3_copy(b->velocity, b->velocity_before);
+  if (b->elsewhere.known) {
+    hapi_v3_copy(b->elsewhere.velocity, b->velocity);
+    b->off = HAPI_SAFETY_SWING_LIMIT * HAPI_SAFETY_GAP_MOST_S * HAPI_SAFETY_GAP_MOST_S;
+  } else if (passed > 0.0) {
+    double off[3];
+    hapi_v3_madd(way, -passed, b->velocity, off);
+    b->off = hapi_v3_norm(off);
+    hapi_v3_scale(1.0 / passed, way, b->velocity);
+    b->spin =
+        pointer_turns(p) ? turn_between(p->device.pose.quat_wxyz, b->line.quat_wxyz) / passed : 0.0;
+  }
+  b->line = p->device.pose;
+  b->line_ns = now_ns;
+  b->paced = true;
+}
+
+/* At a new place, which the device told after so long. The line is made of poses that are not too
+ * near in time: else its velocity would be noise, and the bound another one at each rate. */
 static void sample_take(hapi_pointer *p, int64_t now_ns)
 {
   hapi_pointer_belief *b = &p->belief;
-  double passed = seconds_between(b->sample_ns, now_ns);
-  double way[3];
-  hapi_v3_sub(p->device.pose.position, b->told.position, way);
-  double step = hapi_v3_norm(way);
-  if (b->elsewhere.known) {
-    hapi_v3_copy(b->elsewhere.velocity, b->velocity);
-  } else if (passed > 0.0) {
-    double share = hapi_min(passed / VELOCITY_S, 1.0);
-    hapi_v3_scale(1.0 - share, b->velocity, b->velocity);
-    hapi_v3_madd(b->velocity, share / passed, way, b->velocity);
-    b->spin =
-        pointer_turns(p) ? turn_between(p->device.pose.quat_wxyz, b->told.quat_wxyz) / passed : 0.0;
+  double step[3];
+  hapi_v3_sub(p->device.pose.position, b->told.position, step);
+  double least = hapi_max(HAPI_SAFETY_QUANTA * p->velocity.quantum, HAPI_SAFETY_STEP_LEAST);
+  if (!b->elsewhere.known && hapi_v3_norm(step) > least) {
+    gap_note(b, seconds_between(b->sample_ns, now_ns));
   }
-  if (!b->elsewhere.known && step > hapi_max(QUANTA * p->velocity.quantum, STEP_LEAST)) {
-    gap_note(b, passed);
+  if (b->elsewhere.known || seconds_between(b->line_ns, now_ns) > 0.5 * HAPI_SAFETY_JUDGE_S) {
+    line_take(p, now_ns);
   }
   b->told = p->device.pose;
   b->sample_ns = now_ns;
@@ -209,16 +227,24 @@ static bool is_far(const hapi_pointer *p)
   hapi_v3_sub(p->device.pose.position, p->device.good.position, way);
   return hapi_v3_norm(way) > HAPI_SAFETY_JUMP_LEAST ||
          (pointer_turns(p) && turn_between(p->device.pose.quat_wxyz, p->device.good.quat_wxyz) >
-                                  HAPI_SAFETY_SPIN_CHANGE * TICK_S);
+                                  HAPI_SAFETY_SPIN_CHANGE * HAPI_SAFETY_JUDGE_S);
 }
 
-/* On as it went, no faster than a hand is sure to, and then not at all. */
+static double shorter_of(double a, double b)
+{
+  return a * b > 0.0 ? (fabs(a) < fabs(b) ? a : b) : 0.0;
+}
+
+/* On as it went, no faster than a hand is sure to, and then not at all. Of the newest two
+ * velocities the smaller counts: the last pose before may have been false, too. */
 static void pose_carry(hapi_pointer *p, int64_t now_ns)
 {
   const hapi_pointer_belief *b = &p->belief;
   double passed = seconds_between(b->believe_ns, now_ns);
   double velocity[3];
-  hapi_v3_copy(b->velocity, velocity);
+  for (int i = 0; i < 3; ++i) {
+    velocity[i] = shorter_of(b->velocity[i], b->velocity_before[i]);
+  }
   (void)hapi_v3_shorten(velocity, HAPI_SAFETY_CARRY_SPEED);
   p->device.pose = b->told;
   hapi_v3_madd(b->told.position, hapi_min(passed, HAPI_SAFETY_CARRY_S), velocity,
@@ -237,12 +263,20 @@ static void doubt_follow(hapi_pointer *p, bool doubted, double seconds)
   bool pushes = p->guard.share > 0.0;
   b->doubted = doubted;
   b->doubt_s = doubted  ? b->doubt_s + seconds
-               : pushes ? hapi_max(b->doubt_s - FORGET * seconds, 0.0)
+               : pushes ? hapi_max(b->doubt_s - HAPI_SAFETY_DOUBT_FORGET * seconds, 0.0)
                         : 0.0;
   double most = pushes ? HAPI_SAFETY_DOUBT_FADE_S : HAPI_SAFETY_MISFIT_S;
   double loss = (b->doubt_s - HAPI_SAFETY_CARRY_S) / most;
   double back = b->loss - seconds / HAPI_SAFETY_RAMP_IN_S;
   b->loss = hapi_min(hapi_max(hapi_max(loss, back), 0.0), 1.0);
+}
+
+/* It stands still. */
+static void rest_take(hapi_pointer_belief *b)
+{
+  hapi_v3_set(b->velocity, 0.0, 0.0, 0.0);
+  hapi_v3_set(b->velocity_before, 0.0, 0.0, 0.0);
+  b->spin = b->off = 0.0;
 }
 
 bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
@@ -256,17 +290,17 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
     b->known = false;
     return true;
   }
-  if (!b->known || seconds < 0.0 || seconds > STOOD_S) {
+  if (!b->known || seconds < 0.0 || seconds > HAPI_SAFETY_UNREAD_S) {
     b->known = true;
     b->paced = false;
-    b->told = p->device.pose;
-    b->sample_ns = now_ns;
+    memset(b->gaps, 0, sizeof b->gaps);
+    b->told = b->line = p->device.pose;
+    b->sample_ns = b->line_ns = now_ns;
     b->elsewhere.known = false;
-    b->spin = seconds = 0.0;
-    hapi_v3_set(b->velocity, 0.0, 0.0, 0.0);
+    seconds = 0.0;
+    rest_take(b);
   }
   bool news = is_news(p);
-  bool first = now_ns == b->sample_ns;
   bool believed = !news || pose_is_plausible(p, now_ns);
   if (!believed) {
     believed = follow_elsewhere(p, seconds, now_ns);
@@ -274,11 +308,12 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
   } else {
     b->elsewhere.known = false;
   }
+  double stood = seconds_between(b->sample_ns, now_ns);
+  b->paced = b->paced || stood > HAPI_SAFETY_GAP_MOST_S;
   if (believed && news) {
     sample_take(p, now_ns);
-  } else if (believed && seconds_between(b->sample_ns, now_ns) > REST * gap_or_tick(b)) {
-    hapi_v3_set(b->velocity, 0.0, 0.0, 0.0);
-    b->spin = 0.0;
+  } else if (believed && stood > HAPI_SAFETY_REST_GAPS * gap_or_tick(b)) {
+    rest_take(b);
   }
   if (believed) {
     b->elsewhere.known = false;
@@ -286,7 +321,6 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
   } else {
     pose_carry(p, now_ns);
   }
-  b->paced = b->paced || !first;
   b->read_ns = now_ns;
   doubt_follow(p, doubted || !believed, seconds);
   return believed;

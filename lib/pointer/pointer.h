@@ -84,7 +84,11 @@ typedef struct hapi_pointer_belief {
   int64_t believe_ns; /* of the last one that was believed */
   int64_t sample_ns;  /* of the last one of those that was another one than before: */
   hap_pose told;
+  int64_t line_ns; /* of the pose from which the line begins: */
+  hap_pose line;
   double velocity[3];
+  double velocity_before[3];     /* of the line before it */
+  double off;                    /* m, of this pose from that line */
   double spin;                   /* rad/s */
   double gaps[HAPI_BELIEF_GAPS]; /* s, before the newest steps: a ring */
   hapi_elsewhere elsewhere;

@@ -23,12 +23,6 @@
  * Where several leave their lengths at once nothing is believed. The bound grows with the time
  * since the newest reply that was: a grip that really jumped is back after some ms. */
 
-#define TICK_S 1e-3      /* bounds are of this time at least: a reply may come a part of it late */
-#define STRING_SHARE 2.0 /* of the hand's bound: a motor's rotor goes by what its string gives */
-#define QUANTA 3.0       /* counts, by which a difference of differences may be rounded */
-#define STALE_QUANTA 6.0 /* counts that a string would have gone */
-#define LATE_MOST_S 0.01 /* the bound grows no more behind a longer time without replies */
-
 static double metres_of(const hapi_spidar_model *model, int string)
 {
   HAPI_ASSERT_INDEX(string, model->strings);
@@ -60,12 +54,12 @@ static uint32_t strings_suspect(const hapi_spidar_belief *b, const hapi_spidar_m
                                 const double lengths[HAPI_SPIDAR_STRINGS_MAX])
 {
   uint32_t suspects = 0;
-  double t = hapi_min(seconds, LATE_MOST_S);
-  double bound =
-      STRING_SHARE * HAPI_SAFETY_ACCELERATION_LIMIT * hapi_max(t, TICK_S) * hapi_max(t, TICK_S);
+  double t = hapi_min(seconds, HAPI_SAFETY_SILENCE_S);
+  double bound = HAPI_SAFETY_STRING_SHARE * HAPI_SAFETY_ACCELERATION_LIMIT *
+                 hapi_max(t, HAPI_SAFETY_JUDGE_S) * hapi_max(t, HAPI_SAFETY_JUDGE_S);
   for (int i = 0; b->known && i < model->strings; ++i) {
     double off = lengths[i] - b->length[i] - t * rates[i];
-    suspects |= fabs(off) > bound + QUANTA * metres_of(model, i) ? 1u << i : 0;
+    suspects |= fabs(off) > bound + HAPI_SAFETY_QUANTA * metres_of(model, i) ? 1u << i : 0;
   }
   return suspects;
 }
@@ -90,7 +84,7 @@ static bool is_stale(hapi_spidar_belief *b, const hapi_spidar_model *model, int6
     return false;
   }
   double way = b->pace * 1e-9 * (double)(time_ns - b->change_ns);
-  return b->pace >= HAPI_SAFETY_STALE_SPEED && way >= STALE_QUANTA * finest;
+  return b->pace >= HAPI_SAFETY_STALE_SPEED && way >= HAPI_SAFETY_STALE_QUANTA * finest;
 }
 
 /* One more than the pose needs is left when one is left out. */
