@@ -42,8 +42,10 @@ typedef bool (*hap_direction_fn)(void *user, dGeomID a, dGeomID b, double out_di
 typedef void (*hap_pointer_surface_fn)(void *user, hap_pointer_id pointer, dGeomID geom,
                                        double *io_mu);
 
-/* [physics] Before a global step: apply forces. After it: read results. step_s: its length, s.
- * Never called for testing simulations. */
+/* [physics] Before a global step: apply forces. After it: read results, and set velocities of
+ * kinematic bodies and motors of joints for the step to come. Near a hand they act from then on in
+ * model CONTACT; set before a step, they act a step late there (docs/platforms.md). step_s: length
+ * of the step, s. Never called for testing simulations. */
 typedef void (*hap_step_fn)(void *user, double step_s);
 
 /* The application's world. It has a size and may grow at its end.

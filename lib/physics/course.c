@@ -136,6 +136,12 @@ static void past_stretch(hapi_course_past *past, double ratio)
   }
 }
 
+void hapi_course_set(hapi_course_past *past, const hap_twist *twist, double seconds)
+{
+  way_of_twist(twist, seconds, past->set);
+  past->moves = part_norm(past->set, 0) + part_norm(past->set, 1) > 0.0;
+}
+
 void hapi_course_note(hapi_course_past *past, const hap_pose *pose, const hap_twist *twist,
                       double seconds)
 {
@@ -162,8 +168,7 @@ void hapi_course_note(hapi_course_past *past, const hap_pose *pose, const hap_tw
     past->known = true;
     past->place = *pose;
   }
-  past->moves = part_norm(now, 0) + part_norm(now, 1) > 0.0;
-  memcpy(past->set, now, sizeof now);
+  hapi_course_set(past, twist, seconds);
 }
 
 void hapi_course_stand(hapi_course_past *past, const hap_pose *pose, double seconds, uint32_t syncs)

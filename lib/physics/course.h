@@ -27,6 +27,9 @@ typedef struct hapi_course_past {
 void hapi_course_note(hapi_course_past *past, const hap_pose *pose, const hap_twist *twist,
                       double seconds);
 
+/* After the note of a sync: it has been given another velocity for the step to come. */
+void hapi_course_set(hapi_course_past *past, const hap_twist *twist, double seconds);
+
 /* Before its first note: it has stood there for so many syncs, that far apart. */
 void hapi_course_stand(hapi_course_past *past, const hap_pose *pose, double seconds,
                        uint32_t syncs);

@@ -109,13 +109,15 @@ static void global_step(hapi_physics *physics)
   }
 }
 
-static void call_step(hapi_physics *physics, hap_step_fn callback)
+static bool call_step(hapi_physics *physics, hap_step_fn callback)
 {
-  if (callback != NULL && physics->cycle.step_s > 0.0) {
-    physics->lock.editable = true;
-    callback(physics->world.ode.user, physics->cycle.step_s);
-    physics->lock.editable = false;
+  if (callback == NULL || !(physics->cycle.step_s > 0.0)) {
+    return false;
   }
+  physics->lock.editable = true;
+  callback(physics->world.ode.user, physics->cycle.step_s);
+  physics->lock.editable = false;
+  return true;
 }
 
 void hapi_physics_fill_settings(hapi_physics *physics)
@@ -151,7 +153,7 @@ static void sync_in(hapi_physics *physics)
   hapi_dial_place(&physics->dial, percent);
   hapi_physics_fill_settings(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
-  call_step(physics, physics->world.ode.before_step);
+  (void)call_step(physics, physics->world.ode.before_step);
   if (hapi_physics_scan(physics, true) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
   }
@@ -175,7 +177,7 @@ static void sync_out(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
              !hapi_tape_plays(physics->tape.tape)) {
     valid_ns = now_ns + 2 * half_tick; /* nothing is ready at once */
   }
-  hapi_physics_send_model(physics, state_ns, valid_ns - half_tick);
+  hapi_physics_make_model(physics, state_ns, valid_ns - half_tick);
   hapi_reconcile_leave(&physics->account);
   hapi_slots_release(&physics->near);
   hapi_joints_leave(&physics->world.joints);
@@ -337,7 +339,10 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_dial_leave(&physics->dial, physics->world.ode.world);
   seconds[4] += stopwatch_lap(&watch);
   note_times(physics, seconds, looked_s);
-  call_step(physics, physics->world.ode.after_step);
+  if (call_step(physics, physics->world.ode.after_step)) {
+    hapi_physics_renew_model(physics);
+  }
+  hapi_physics_send_model(physics);
 }
 
 void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)

@@ -217,7 +217,8 @@ hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_deta
   const int64_t times_ns[2] = {*start_ns, *start_ns};
   hapi_poses_publish(&physics->drawing, &physics->world, &physics->near.slots, &physics->cycle,
                      times_ns);
-  hapi_physics_send_model(physics, *start_ns, *start_ns);
+  hapi_physics_make_model(physics, *start_ns, *start_ns);
+  hapi_physics_send_model(physics);
   hapi_tape_started(&physics->tape, &physics->cycle);
   hapi_reconcile_leave(&physics->account);
   hapi_slots_release(&physics->near);

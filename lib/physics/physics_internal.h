@@ -92,7 +92,10 @@ void hapi_physics_run_edits(hapi_physics *physics); /* those that wait; the call
 /* The newest message of the loop, if there is one. */
 void hapi_physics_take_state(hapi_physics *physics);
 
-/* publish.c: the next model */
-void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
+/* publish.c: the next model is made, renewed after after_step, and sent */
+void hapi_physics_make_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns);
+/* Velocities of driven bodies and parameters of joints once more: they hold from now on. */
+void hapi_physics_renew_model(hapi_physics *physics);
+void hapi_physics_send_model(hapi_physics *physics);
 
 #endif

@@ -21,6 +21,13 @@ typedef struct publishing {
   hapi_account *account;
 } publishing;
 
+static publishing publishing_of(hapi_physics *physics)
+{
+  return (publishing){&physics->cycle,         &physics->world,
+                      &physics->near.slots,    &physics->near.neighbors.relief,
+                      &physics->probe.answers, &physics->account};
+}
+
 static double keep_per_tick(const hapi_cycle *cycle, double damping)
 {
   double share = damping < 0.0 ? 0.0 : damping > 1.0 ? 1.0 : damping; /* lost in a step of H */
@@ -115,27 +122,32 @@ static bool is_zero(const hap_twist *twist)
 
 /* A kinematic body that is moved by its pose alone has the velocity of its way in the next step: in
  * the loop it would stand until the next sync else. */
+static void course_expect(const hapi_cycle *cycle, const hapi_course_past *past,
+                          hapi_model_course *out, hap_twist *io_twist)
+{
+  hapi_course_find(past, io_twist, cycle->time_scale * cycle->probe_step_s, out);
+  if (is_zero(io_twist)) {
+    hapi_course_mean(out, io_twist);
+  }
+  hapi_course_scale(cycle->time_scale, out);
+}
+
 static void fill_course(const publishing *p, const hapi_known_body *known, hapi_slot_account *of,
                         hapi_model *model, hapi_model_body *out)
 {
   const hapi_posed_way *way = known->posed ? &known->rest->way : NULL;
   hapi_model_course *course = &hapi_model_courses(model)[model->course_count];
   double period = p->cycle->probe_step_s;
-  double scale = p->cycle->time_scale;
   if (way != NULL && way->fresh) {
     hapi_course_stand(&of->course, &way->before, period, way->stood);
   } else if (way != NULL && !of->course.known) {
     hapi_course_note(&of->course, &way->before, &out->twist, 0.0);
   }
   hapi_course_note(&of->course, &out->pose, &out->twist, p->cycle->step_s);
-  if (!(scale > 0.0)) {
+  if (!(p->cycle->time_scale > 0.0)) {
     return; /* a pause: it stands */
   }
-  hapi_course_find(&of->course, &out->twist, scale * period, course);
-  if (is_zero(&out->twist)) {
-    hapi_course_mean(course, &out->twist);
-  }
-  hapi_course_scale(scale, course);
+  course_expect(p->cycle, &of->course, course, &out->twist);
   course->begins = way != NULL && way->fresh;
   course->before = way != NULL ? way->before : out->pose;
   if (p->cycle->model == HAP_MODEL_CONTACT || course->begins != 0) {
@@ -403,17 +415,12 @@ static uint32_t count_bounces(const hapi_range *range, hapi_model *model)
   return count;
 }
 
-void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns)
+void hapi_physics_make_model(hapi_physics *physics, int64_t state_ns, int64_t valid_from_ns)
 {
   HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
   hapi_cycle *cycle = &physics->cycle;
   hapi_model *out = hapi_exchange_model_back(physics->config.exchange);
-  const publishing p = {cycle,
-                        &physics->world,
-                        &physics->near.slots,
-                        &physics->near.neighbors.relief,
-                        &physics->probe.answers,
-                        &physics->account};
+  const publishing p = publishing_of(physics);
   ++cycle->model_number;
   HAPI_ASSERT(cycle->probe_step_s > 0.0);
   out->number = cycle->model_number;
@@ -481,8 +488,102 @@ void hapi_physics_send_model(hapi_physics *physics, int64_t state_ns, int64_t va
   out->touches = physics->counts.own.stats.model.pointer_contacts;
   hapi_effects_note(physics->counts.own.effects, cycle, &physics->world, &physics->near,
                     &physics->probe.answers, out);
-  hapi_tape_model(&physics->tape, out);
   /* First: the contact thread waits for the loop to use the model. */
   hapi_range_publish(&physics->near);
+}
+
+void hapi_physics_send_model(hapi_physics *physics)
+{
+  hapi_tape_model(&physics->tape, hapi_exchange_model_back(physics->config.exchange));
   hapi_exchange_model_publish(physics->config.exchange);
+}
+
+/* ---- what the application has set in after_step ---- */
+
+/* The callback may have destroyed bodies without a word: those with a geom are known to live. */
+static void space_note_living(const hapi_body_table *table, hapi_slots *slots, dSpaceID space)
+{
+  int count = dSpaceGetNumGeoms(space);
+  for (int i = 0; i < count; ++i) {
+    dGeomID geom = dSpaceGetGeom(space, i);
+    if (dGeomIsSpace(geom)) {
+      space_note_living(table, slots, (dSpaceID)geom);
+      continue;
+    }
+    uint32_t index = hapi_bodies_find(table, dGeomGetBody(geom));
+    const hapi_known_body *known = index != HAPI_NONE ? &table->entries[index] : NULL;
+    if (known != NULL && known->slot != HAPI_NONE && !hapi_mark_is_gone(known)) {
+      slots->bodies[known->slot].alive = true;
+    }
+  }
+}
+
+/* NULL: it is not known to live. */
+static dBodyID body_living(const publishing *p, uint32_t slot)
+{
+  const hapi_body_slot *of = slot != HAPI_SLOT_NONE ? &p->slots->bodies[slot] : NULL;
+  return of != NULL && of->alive ? p->world->bodies.entries[of->known].body : NULL;
+}
+
+static bool joint_lives(const publishing *p, const hapi_model_joint *joint,
+                        const hapi_known_joint *known)
+{
+  const uint32_t slots[2] = {joint->body_a, joint->body_b};
+  for (int i = 0; i < 2; ++i) {
+    dBodyID body = body_living(p, slots[i]);
+    for (int k = body != NULL ? dBodyGetNumJoints(body) : 0; k > 0; --k) {
+      if (dBodyGetJoint(body, k - 1) == known->joint) {
+        return dJointGetType(known->joint) == known->name.type;
+      }
+    }
+  }
+  return false;
+}
+
+static void body_renew(const publishing *p, hapi_model *model, hapi_model_body *io)
+{
+  dBodyID body = io->course != 0 ? body_living(p, io->slot) : NULL;
+  hap_twist twist;
+  if (body == NULL) {
+    return;
+  }
+  hapi_twist_read(body, &twist);
+  if (!hapi_finite(twist.linear, 3) || !hapi_finite(twist.angular, 3)) {
+    return;
+  }
+  hapi_slot_account *of = hapi_account_of(p->account, io->slot);
+  hapi_model_course *course = &hapi_model_courses(model)[io->course - 1];
+  uint32_t begins = course->begins;
+  hap_pose before = course->before;
+  hapi_course_set(&of->course, &twist, p->cycle->step_s);
+  course_expect(p->cycle, &of->course, course, &twist);
+  course->begins = begins;
+  course->before = before;
+  hapi_v3_scale(p->cycle->time_scale, twist.linear, io->twist.linear);
+  hapi_v3_scale(p->cycle->time_scale, twist.angular, io->twist.angular);
+}
+
+void hapi_physics_renew_model(hapi_physics *physics)
+{
+  hapi_model *model = hapi_exchange_model_back(physics->config.exchange);
+  const publishing p = publishing_of(physics);
+  if (model->model != HAP_MODEL_CONTACT || (model->course_count == 0 && model->joint_count == 0)) {
+    return;
+  }
+  for (uint32_t i = 0; i < p.slots->body_high; ++i) {
+    physics->near.slots.bodies[i].alive = false;
+  }
+  space_note_living(&physics->world.bodies, &physics->near.slots, physics->world.ode.space);
+  for (uint32_t i = 0; i < model->body_count; ++i) {
+    body_renew(&p, model, &hapi_model_bodies(model)[i]);
+  }
+  for (uint32_t i = 0; i < model->joint_count; ++i) {
+    hapi_model_joint *joint = &hapi_model_joints(model)[i];
+    const hapi_known_joint *known =
+        &physics->world.joints.entries[physics->near.range.mechanism.joints[i]];
+    if (known->carried && joint_lives(&p, joint, known)) {
+      memset(joint->limits, 0, sizeof joint->limits);
+      fill_parameters(&p, known, joint);
+    }
+  }
 }
