@@ -245,6 +245,36 @@ TEST(a_tool_that_arrives_deep_comes_in_slowly)
   }
 }
 
+/* From the first tick on, 2 mm deep: the second model knows the body by a number, and the touch
+ * is the one that it was. */
+static void check_start_in_touch(hap_model model, bool kinematic)
+{
+  tool_world *w = tool_new(model);
+  dWorldSetGravity(w->world, 0.0, 0.0, 0.0);
+  dBodyID body = ode_box(w->world, w->space, 1e4, AT(0.1, 0.1, 0.1), AT(0.0, 0.0, -0.05));
+  if (kinematic) {
+    dBodySetKinematic(body);
+  }
+  w->def.physics_hz = 20.0;
+  tool_go(w, 0.0, 0.0, HALF - 0.002, 0.0);
+  tool_start(w);
+  for (int i = 0; i < 150; ++i) {
+    tool_step(w);
+    CHECK(w->state.wrench.force[2] < 2.0 + 1e-3);
+    CHECK(i < 40 || w->state.wrench.force[2] > 2.0 - 1e-3);
+  }
+  CHECK(w->steepest < 0.101); /* 2 N in 20 ms */
+  tool_end(w);
+}
+
+TEST(a_tool_that_starts_in_touch_with_a_body_pushes_once)
+{
+  for (int m = 0; m < 4; ++m) {
+    check_start_in_touch(all_models[m], true);
+    check_start_in_touch(all_models[m], false);
+  }
+}
+
 /* A stack of three cubes of 2 g under a tool that presses, tilts and turns on it: it stays, and
  * the hand gets nothing back that it did not put in. */
 TEST(a_stack_of_light_cubes_stays_calm_under_a_tool)

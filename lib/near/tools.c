@@ -237,11 +237,11 @@ static void search_reduce(tool_search *s)
 uint64_t hapi_tool_geom_key(hapi_nearby *nearby, dGeomID geom, uint32_t pointer)
 {
   uint32_t known = hapi_bodies_find(&nearby->world->bodies, hapi_geom_body(nearby->world, geom));
-  uint32_t slot = known != HAPI_NONE ? nearby->world->bodies.entries[known].slot : HAPI_NONE;
-  bool carried = known != HAPI_NONE && nearby->world->bodies.entries[known].rest->geom != NULL;
-  uint64_t holder = slot != HAPI_NONE && !carried ? nearby->slots.bodies[slot].generation : 0;
+  const hapi_known_rest *holder =
+      known != HAPI_NONE ? nearby->world->bodies.entries[known].rest : NULL;
+  uint64_t birth = holder != NULL && holder->geom == NULL ? holder->birth : 0; /* else a carrier */
   uint64_t name = hapi_geom_names_get(&nearby->tools.names, geom, nearby->cycle->model_number + 1);
-  uint64_t key = name + (holder << 48);
+  uint64_t key = name + (birth << 48);
   return hapi_tool_key(key, pointer, hapi_state_pointers(nearby->cycle->state)[pointer].generation);
 }
 
