@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 
 #include <errno.h>
+#include <fcntl.h>
 #include <limits.h>
 #include <math.h>
 #include <stdarg.h>
@@ -10,6 +11,7 @@
 #include <sys/stat.h>
 #include <time.h>
 
+#include "base/regular.h"
 #include "bench/bench.h"
 #include "tools/plot.h"
 
@@ -33,9 +35,10 @@ FILE *bench_csv_open(bench *b, const char *name, const char *header)
     (void)bench_fail(b, HAP_ERROR_IO, "the name of the folder is too long");
     return NULL;
   }
-  FILE *csv = fopen(path, "w");
+  const char *why;
+  FILE *csv = hapi_regular_create_stream(path, O_TRUNC, &why);
   if (csv == NULL) {
-    (void)bench_fail(b, HAP_ERROR_IO, "%s: %s", path, strerror(errno));
+    (void)bench_fail(b, HAP_ERROR_IO, "%s: %s", path, why);
     return NULL;
   }
   if (header != NULL) {

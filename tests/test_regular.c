@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Every reader of a file refuses what is none, at once and in words: a pipe would hang it. A hang
- * is a time-out of this test. */
+/* Every reader and writer of a file refuses what is none, at once and in words: a pipe would hang
+ * it. A hang is a time-out of this test. */
 
 #include "tests/files.h"
 #include "tests/tap.h"
@@ -18,6 +18,7 @@
 #include <hapode/record.h>
 
 #include "base/regular.h"
+#include "plugins/spidar/model.h"
 
 static hap_status recording_read(const char *path, hap_detail *detail)
 {
@@ -91,6 +92,103 @@ TEST(pipes_sockets_devices_and_folders_are_refused)
   all_refuse(folder_path("pipe"), "a pipe");
   close(held);
   close(end);
+}
+
+/* ---- writers ---- */
+
+static hap_status identity_write(const char *path, hap_detail *detail)
+{
+  hap_device_identity identity;
+  hap_device_identity_init(&identity, sizeof identity);
+  snprintf(identity.device, sizeof identity.device, "some");
+  return hap_device_identity_write(path, &identity, detail);
+}
+
+static hap_status stream_write(const char *path, hap_detail *detail)
+{
+  const char *why = "of before";
+  FILE *stream = hapi_regular_create_stream(path, O_TRUNC, &why);
+  CHECK((stream != NULL) == (why == NULL));
+  snprintf(detail->text, sizeof detail->text, "%s: %s", path, stream == NULL ? why : "");
+  bool good = stream != NULL && fputs("b\n", stream) >= 0;
+  good = stream != NULL && fclose(stream) == 0 && good;
+  return good ? HAP_OK : HAP_ERROR_IO;
+}
+
+static hap_status (*const writers[])(const char *path, hap_detail *detail) = {identity_write,
+                                                                              stream_write};
+
+static void writers_refuse(const char *path, const char *what)
+{
+  for (size_t i = 0; i < sizeof writers / sizeof writers[0]; ++i) {
+    hap_detail detail = {""};
+    hap_status status = writers[i](path, &detail);
+    CHECK_SAY(status == HAP_ERROR_IO && strstr(detail.text, what) != NULL &&
+                  strstr(detail.text, path) != NULL,
+              "writer %zu, %s: %s, \"%s\"", i, path, hap_status_name(status), detail.text);
+  }
+}
+
+TEST(nothing_is_written_to_pipes_sockets_devices_and_folders)
+{
+  char beside[300];
+  hap_detail detail = {""};
+  writers_refuse(folder_path("pipe"), "a pipe");
+  writers_refuse(folder_path("socket"), "a pipe");
+  writers_refuse(folder_path("link"), "a pipe");
+  writers_refuse(test_folder, "a folder");
+  writers_refuse("/dev/zero", "a device");
+  writers_refuse("/dev/ptmx", "a device");
+  writers_refuse(folder_path("no/file"), "No such file");
+  int held = open(folder_path("pipe"), O_RDWR);
+  REQUIRE(held >= 0);
+  writers_refuse(folder_path("pipe"), "a pipe"); /* its reader may stop */
+  close(held);
+  snprintf(beside, sizeof beside, "%s.new", folder_path("geometry"));
+  REQUIRE(mkfifo(beside, 0600) == 0); /* where a geometry is written first */
+  CHECK(hapi_spidar_model_write(folder_path("geometry"), hapi_spidar_model_find("x4r"), &detail) ==
+        HAP_ERROR_IO);
+  CHECK(strstr(detail.text, "a pipe") != NULL);
+}
+
+TEST(files_are_written)
+{
+  hap_detail detail = {""};
+  const char *why = "of before";
+  char text[8] = "";
+  file_write(folder_path("written"), "what was there before\n");
+  REQUIRE(symlink("written", folder_path("to_written")) == 0);
+  CHECK(stream_write(folder_path("to_written"), &detail) == HAP_OK);
+  int file = hapi_regular_create(folder_path("written"), O_APPEND, &why);
+  REQUIRE(file >= 0 && why == NULL);
+  CHECK((fcntl(file, F_GETFD) & FD_CLOEXEC) != 0);
+  CHECK((fcntl(file, F_GETFL) & (O_NONBLOCK | O_APPEND)) == O_APPEND);
+  CHECK(write(file, "c\n", 2) == 2);
+  close(file);
+  FILE *stream = fopen(folder_path("written"), "r");
+  REQUIRE(stream != NULL);
+  CHECK(fread(text, 1, sizeof text, stream) == 4 && memcmp(text, "b\nc\n", 4) == 0);
+  fclose(stream);
+  CHECK(stream_write("/dev/null", &detail) == HAP_OK);
+}
+
+/* A pipe too, where the program writes to it anyway. */
+TEST(standard_output_may_be_named)
+{
+  int ends[2];
+  char text[8] = "";
+  hap_detail detail = {""};
+  fflush(stdout);
+  int before = dup(STDOUT_FILENO);
+  REQUIRE(before >= 0 && pipe(ends) == 0);
+  REQUIRE(dup2(ends[1], STDOUT_FILENO) >= 0);
+  hap_status status = stream_write("/dev/stdout", &detail);
+  REQUIRE(dup2(before, STDOUT_FILENO) >= 0);
+  close(before);
+  close(ends[1]);
+  CHECK_SAY(status == HAP_OK, "%s", detail.text);
+  CHECK(read(ends[0], text, sizeof text) == 2 && memcmp(text, "b\n", 2) == 0);
+  close(ends[0]);
 }
 
 TEST(files_are_opened)

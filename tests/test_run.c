@@ -9,6 +9,7 @@
 #include "tests/tap.h"
 
 #include <signal.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -189,6 +190,20 @@ TEST(files_that_cannot_be_written_are_found_before_the_run)
   CHECK(ran.out[0] == '\0');
   CHECK(run("--lockstep --seconds 1 --trace %s", test_folder) == 1);
   CHECK(says("--trace"));
+}
+
+/* A reader that comes late, or never, would stop the program. */
+TEST(no_file_is_written_to_a_pipe)
+{
+  static const char *const options[] = {"--trace", "--plot", "--black-box", "--record",
+                                        "--identify"};
+  REQUIRE(mkfifo(folder_path("pipe"), 0600) == 0);
+  for (size_t i = 0; i < sizeof options / sizeof options[0]; ++i) {
+    CHECK(run("--seconds 1 --device virtual %s %s", options[i], folder_path("pipe")) == 1);
+    CHECK_SAY(says(options[i] + 2) && says("it is a pipe"), "%s: %s", options[i], ran.err);
+    CHECK(ran.out[0] == '\0');
+  }
+  CHECK(run("--lockstep --seconds 0.1 --trace /dev/null") == 0);
 }
 
 TEST(a_full_disk_is_a_failure_that_the_hand_does_not_feel)

@@ -4,11 +4,13 @@
 /* The program: one scene, one session, one summary. */
 
 #include <errno.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/regular.h"
 #include "tools/plot.h"
 #include "tools/rig.h"
 #include "tools/run_black_box.h"
@@ -37,13 +39,15 @@ static int usage_complain(int code, const char *text)
 }
 
 /* What cannot be written must be known before the hand has moved. */
-static bool check_writable(const char *option, const char *path, FILE *opened, hap_detail *detail)
+static FILE *output_open(const char *option, const char *path, int how, hap_detail *detail)
 {
-  if (opened == NULL) {
+  const char *why;
+  FILE *file = hapi_regular_create_stream(path, how, &why);
+  if (file == NULL) {
     snprintf(detail->text, sizeof detail->text, "%s %.300s: cannot be written: %s", option, path,
-             strerror(errno));
+             why);
   }
-  return opened != NULL;
+  return file;
 }
 
 static bool open_trace(const run_options *options, run_loop *loop, hap_detail *detail)
@@ -51,11 +55,11 @@ static bool open_trace(const run_options *options, run_loop *loop, hap_detail *d
   if (options->trace_path == NULL) {
     return true;
   }
-  loop->trace.file = fopen(options->trace_path, "w");
+  loop->trace.file = output_open("--trace", options->trace_path, O_TRUNC, detail);
   loop->trace.pointers = loop->pointers;
   size_t bodies = loop->rig->scene->body_count;
   loop->trace.bodies = bodies < HAP_TRACE_BODIES_MAX ? bodies : HAP_TRACE_BODIES_MAX;
-  return check_writable("--trace", options->trace_path, loop->trace.file, detail);
+  return loop->trace.file != NULL;
 }
 
 static bool open_black_box(const run_options *options, run_loop *loop, hap_detail *detail)
@@ -63,8 +67,8 @@ static bool open_black_box(const run_options *options, run_loop *loop, hap_detai
   if (options->black_box_path == NULL) {
     return true;
   }
-  loop->black_box = fopen(options->black_box_path, "w");
-  return check_writable("--black-box", options->black_box_path, loop->black_box, detail);
+  loop->black_box = output_open("--black-box", options->black_box_path, O_TRUNC, detail);
+  return loop->black_box != NULL;
 }
 
 /* The file has its rows when there was a fault; of a run without one only the header. */
@@ -96,8 +100,8 @@ static bool open_picture(const run_options *options, run_loop *loop, hap_detail 
   }
   struct stat before;
   bool made = lstat(options->plot_path, &before) != 0;
-  FILE *file = fopen(options->plot_path, "a");
-  if (!check_writable("--plot", options->plot_path, file, detail)) {
+  FILE *file = output_open("--plot", options->plot_path, O_APPEND, detail);
+  if (file == NULL) {
     return false;
   }
   fclose(file);

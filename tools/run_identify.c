@@ -2,13 +2,14 @@
  * SPDX-License-Identifier: MIT */
 #include "tools/run_identify.h"
 
-#include <errno.h>
+#include <fcntl.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "base/log.h"
+#include "base/regular.h"
 #include "device/device.h"
 #include "tools/run_loop.h"
 
@@ -19,12 +20,12 @@ static hap_status check_writable(const char *path, hap_detail *detail)
 {
   struct stat before;
   bool made = stat(path, &before) != 0;
-  FILE *file = fopen(path, "a");
-  if (file == NULL) {
-    return hapi_fail(detail, HAP_ERROR_IO, "--identify %.300s: cannot be written: %s", path,
-                     strerror(errno));
+  const char *why;
+  int file = hapi_regular_create(path, O_APPEND, &why);
+  if (file < 0) {
+    return hapi_fail(detail, HAP_ERROR_IO, "--identify %.300s: cannot be written: %s", path, why);
   }
-  fclose(file);
+  close(file);
   if (made) {
     (void)unlink(path);
   }

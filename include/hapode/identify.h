@@ -39,8 +39,8 @@ HAP_NODISCARD HAP_API hap_status hap_device_identity_read(const char *path,
                                                           hap_detail *detail);
 
 /* [control] Writes *identity to the file at path, in the form that hap_device_identity_read
- * takes. A file that is there is overwritten. HAP_ERROR_IO with the reason in detail (may be
- * NULL). */
+ * takes. A regular file that is there is overwritten. HAP_ERROR_IO with the reason in detail (may
+ * be NULL). */
 HAP_NODISCARD HAP_API hap_status hap_device_identity_write(const char *path,
                                                            const hap_device_identity *identity,
                                                            hap_detail *detail);

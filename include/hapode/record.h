@@ -45,7 +45,7 @@ typedef enum hap_record_end {
 typedef struct hap_record_def {
   uint32_t size;    /* set by hap_record_def_init */
   uint32_t cookie;  /* set by hap_record_def_init */
-  const char *path; /* of the file, copied; one that is there is overwritten */
+  const char *path; /* of the file, copied; a regular file that is there is overwritten */
   /* 65536 or more, default 2^30: the file grows no further (HAP_RECORD_LIMIT). A tick of one
    * pointer and ten moving bodies takes about 500 bytes. */
   uint64_t max_bytes;
@@ -62,7 +62,8 @@ HAP_API void hap_record_def_init(hap_record_def *def, size_t size_of_def);
  * The file is opened and begun now. The tick hands fixed-size pieces to a thread that writes;
  * only stop waits for that thread. ODE's island threads are off while recording.
  * HAP_ERROR_STATE: drive LOCKSTEP, a session that was started or is recorded, or effect
- * RECORDING is off. HAP_ERROR_IO: the file. detail may be NULL. */
+ * RECORDING is off. HAP_ERROR_IO: the file, which must not be a pipe or socket, nor another device
+ * than /dev/null. detail may be NULL. */
 HAP_NODISCARD HAP_API hap_status hap_session_record(hap_session *session, const hap_record_def *def,
                                                     hap_detail *detail);
 

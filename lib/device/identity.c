@@ -4,6 +4,7 @@
 /* The file of an identity, and a device that takes one over. */
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -11,6 +12,7 @@
 #include "base/key_file.h"
 #include "base/log.h"
 #include "base/number.h"
+#include "base/regular.h"
 #include "device/device.h"
 #include "device/identify.h"
 
@@ -194,9 +196,10 @@ hap_status hap_device_identity_write(const char *path, const hap_device_identity
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "the path is NULL, or the device's name is not one line of text");
   }
-  FILE *file = fopen(path, "w");
+  const char *why;
+  FILE *file = hapi_regular_create_stream(path, O_TRUNC, &why);
   if (file == NULL) {
-    return hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", path, strerror(errno));
+    return hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", path, why);
   }
   fprintf(file, "# hapode: what an identification found out about a device\nversion = 1\n");
   fprintf(file, "device = %s\n", known.device);

@@ -13,6 +13,7 @@
 #include "base/assert.h"
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/regular.h"
 #include "base/thread.h"
 
 #define PAUSE_NS 10000000  /* between two looks at the rings */
@@ -259,16 +260,16 @@ hap_status hapi_recorder_create(const hapi_recorder_config *config, hapi_recorde
     hapi_recorder_destroy(recorder);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a recording");
   }
-  recorder->file = open(config->path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  int error = recorder->file < 0 ? errno : 0;
-  if (error == 0) {
+  const char *why;
+  recorder->file = hapi_regular_create(config->path, O_TRUNC, &why);
+  if (recorder->file >= 0) {
     file_begin(recorder, config);
-    error = atomic_load(&recorder->error);
+    int error = atomic_load(&recorder->error);
+    why = error != 0 ? strerror(error) : NULL;
   }
-  if (error != 0) {
+  if (why != NULL) {
     hapi_recorder_destroy(recorder);
-    return hapi_fail(detail, HAP_ERROR_IO, "%.300s: cannot be written: %s", config->path,
-                     strerror(error));
+    return hapi_fail(detail, HAP_ERROR_IO, "%.300s: cannot be written: %s", config->path, why);
   }
   *out = recorder;
   return HAP_OK;

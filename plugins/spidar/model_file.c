@@ -4,6 +4,7 @@
 /* The geometry file: lines "key = value", '#' begins a comment. */
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,6 +12,7 @@
 #include "base/key_file.h"
 #include "base/log.h"
 #include "base/number.h"
+#include "base/regular.h"
 #include "plugins/spidar/model.h"
 
 #define VERSION 1.0
@@ -357,9 +359,10 @@ hap_status hapi_spidar_model_write(const char *path, const hapi_spidar_model *mo
   if (snprintf(whole, sizeof whole, "%s.new", path) >= (int)sizeof whole) {
     return hapi_fail(detail, HAP_ERROR_IO, "%.200s...: the path is too long", path);
   }
-  FILE *file = fopen(whole, "w");
+  const char *why;
+  FILE *file = hapi_regular_create_stream(whole, O_TRUNC, &why);
   if (file == NULL) {
-    return hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", whole, strerror(errno));
+    return hapi_fail(detail, HAP_ERROR_IO, "%.200s: cannot be opened: %s", whole, why);
   }
   write_lines(file, &copy);
   bool good = ferror(file) == 0;
