@@ -78,8 +78,7 @@ void hapi_spidar_identity_at(const char *sysfs, const char *path, hapi_spidar_id
   char real[PATH_MAX];
   memset(out, 0, sizeof *out);
   if (realpath(path, real) != NULL) {
-    const char *name = strrchr(real, '/');
-    hapi_spidar_identity_of(sysfs, name != NULL ? name + 1 : real, out);
+    hapi_spidar_identity_of(sysfs, strrchr(real, '/') + 1, out);
   }
 }
 

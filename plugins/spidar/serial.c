@@ -76,7 +76,8 @@ static bool make_raw(int fd)
   t.c_cflag |= CLOCAL | CREAD;
   t.c_cc[VMIN] = 1; /* so that a read of nothing is EAGAIN, and 0 a line that was hung up */
   t.c_cc[VTIME] = 0;
-  return cfsetspeed(&t, B2000000) == 0 && tcsetattr(fd, TCSANOW, &t) == 0;
+  (void)cfsetspeed(&t, B2000000); /* fails for speeds that it does not know */
+  return tcsetattr(fd, TCSANOW, &t) == 0;
 }
 
 /* What an adapter or a pseudo-terminal does not know does no harm. */
@@ -171,9 +172,8 @@ int hapi_spidar_serial_latency(const char *path)
   if (realpath(path, real) == NULL) {
     return -1;
   }
-  const char *name = strrchr(real, '/');
   snprintf(file, sizeof file, "/sys/bus/usb-serial/devices/%.200s/latency_timer",
-           name != NULL ? name + 1 : real);
+           strrchr(real, '/') + 1);
   int fd = open(file, O_RDONLY | O_CLOEXEC);
   ssize_t count = fd >= 0 ? read(fd, text, sizeof text - 1) : -1;
   if (fd >= 0) {
@@ -190,7 +190,7 @@ static int serial_send(void *self, const uint8_t *bytes, int count)
   ssize_t sent = write(serial->fd, bytes, (size_t)count);
   if (sent < 0) {
     /* EINTR: before a byte went out, by a signal handler that zeroed perhaps */
-    return errno == EINTR || errno == EWOULDBLOCK ? -EAGAIN : -errno;
+    return errno == EINTR ? -EAGAIN : -errno;
   }
   return sent == count ? 0 : -EAGAIN;
 }
@@ -205,7 +205,7 @@ static int serial_receive(void *self, uint8_t *bytes, int size)
   if (count == 0) {
     return -EIO; /* hung up; also /dev/null, when there is no port */
   }
-  return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? 0 : -errno;
+  return errno == EAGAIN || errno == EINTR ? 0 : -errno;
 }
 
 static void serial_await(void *self, double seconds)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""mutants.py ROOT SCRATCH [--list] [--only TEXT] [--sample N] [--seconds S]: whether the tests
-notice when safety code is wrong.
+"""mutants.py ROOT SCRATCH [--list] [--only TEXT,...] [--sample N] [--seconds S]: whether the
+tests notice when safety code is wrong.
 
 Mutants are made by rules, from the files of AREAS:
 - each number of a "#define" times 10 and by 10,
@@ -20,27 +20,37 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
 
-SPIDAR_TESTS = ["spidar_frames", "spidar_model", "spidar_kinematics", "spidar_tensions",
-                "spidar_emulator", "spidar_calibration", "spidar_the", "spidar", "spidar_guard"]
-GUARD_TESTS = ["guard", "guard_session", "faults", "emergency"]
+GUARD_TESTS = ["guard", "guard_session", "faults", "late", "false_input"]
+WATCH_TESTS = ["emergency", "watchdog", "guard_session", "module", "faults_threads"]
+SPIDAR_TESTS = ["spidar_errors", "spidar_frames", "spidar_emulator", "spidar", "false_input",
+                "spidar_the"]
 
 # Pattern of files: tests that should notice, the fast ones first.
 AREAS = [
-    ("lib/device/emergency.c", ["emergency", "guard_session", "module", "faults"]),
+    ("lib/device/emergency.c", WATCH_TESTS),
+    ("lib/device/watchdog.c", WATCH_TESTS),
+    ("lib/haptic/standstill.c", WATCH_TESTS),
+    ("lib/guard/lateness.c", ["late", "guard"]),
     ("lib/guard/*.c", GUARD_TESTS + ["session_devices"]),
-    ("lib/base/safety.h", GUARD_TESTS + SPIDAR_TESTS),
-    ("lib/haptic/*watch*.c", GUARD_TESTS),
+    ("lib/pointer/plausible.c", ["false_input", "faults", "late"]),
+    ("lib/base/safety.h", GUARD_TESTS + WATCH_TESTS + SPIDAR_TESTS + ["spidar_guard"]),
     ("plugins/spidar/guard.c", ["spidar_guard", "spidar"]),
-    ("plugins/spidar/line.c", ["spidar_emulator", "spidar_frames"]),
-    ("plugins/spidar/cycle.c", ["spidar_frames", "spidar_emulator"]),
+    ("plugins/spidar/belief.c", ["false_input", "spidar_emulator", "spidar"]),
+    ("plugins/spidar/serial.c", ["spidar_errors", "spidar", "spidar_emulator"]),
+    ("plugins/spidar/line.c", ["spidar_emulator", "spidar_errors", "spidar"]),
+    ("plugins/spidar/cycle.c", ["spidar_frames", "spidar_emulator", "spidar"]),
     ("plugins/spidar/tensions.c", ["spidar_tensions", "spidar_emulator", "spidar"]),
-    ("plugins/spidar/heat.c", ["spidar_tensions"]),
+    ("plugins/spidar/heat.c", ["spidar_tensions", "spidar_emulator"]),
     ("plugins/spidar/spidar.c", SPIDAR_TESTS),
 ]
+
+PATIENCE = 4.0  # a test may take so much longer on a busy machine
+PATIENCE_S = 10.0
 
 NUMBER = re.compile(r"^#define (\w+) (-?[0-9][0-9.e+-]*)(?=\s|$)", re.M)
 CONDITION = re.compile(r"\bif \(")
@@ -139,6 +149,8 @@ class Scratch:
         self.tree = os.path.join(folder, "tree")
         self.build = os.path.join(folder, "build")
         self.needed = []
+        self.tests = {}
+        self.seconds = {}
         shutil.rmtree(folder, ignore_errors=True)
         names = subprocess.run(["git", "ls-files", "-z"], cwd=root, capture_output=True, text=True,
                                check=True).stdout.split("\0")
@@ -150,8 +162,10 @@ class Scratch:
             f.write(DECLARATION)
         with open(os.path.join(self.tree, "lib/base/status.c"), "a", encoding="utf-8") as f:
             f.write(DEFINITION)
+        # One library: with asserts, as tests have it anyway.
         subprocess.run(["meson", "setup", "-Dlint=disabled", "-Dwerror=false", "-Dwarning_level=0",
-                        "-Dbuildtype=plain", "-Dplots=disabled",
+                        "-Dbuildtype=plain", "-Dplots=disabled", "-Dasserts=enabled",
+                        "-Ddefault_library=static",
                         f"-Dc_args=-include {os.path.join(folder, 'mutant.h')} -w -O1",
                         self.build, self.tree], check=True, stdout=subprocess.DEVNULL)
 
@@ -175,7 +189,7 @@ class Scratch:
         files |= {test["cmd"][0] for test in tests.values()}
         self.needed = [os.path.relpath(f, self.build) for f in sorted(files)
                        if f.startswith(self.build)]
-        return set(tests)
+        self.tests = tests
 
     def make(self):
         """"" or what the compiler says."""
@@ -183,15 +197,34 @@ class Scratch:
                              text=True)
         return "" if run.returncode == 0 else run.stdout + run.stderr
 
-    def passes(self, tests, number):
+    def fails(self, test, number):
+        """Whether the test fails with that mutant, or takes far longer than without any."""
+        about = self.tests[test]
+        patience = PATIENCE_S + PATIENCE * self.seconds.get(test, about["timeout"])
+        environment = dict(os.environ, **about["env"], HAPODE_MUTANT=str(number))
+        with subprocess.Popen(about["cmd"], env=environment, cwd=self.build, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                              start_new_session=True) as run:
+            try:
+                said, _ = run.communicate(timeout=patience)
+            except subprocess.TimeoutExpired:
+                os.killpg(run.pid, signal.SIGKILL)
+                return True
+        return run.returncode != 0 or re.search(r"^(not ok|Bail out!)", said, re.M) is not None
+
+    def measure(self):
+        """Those that fail without a mutant; of the others, how long they take."""
+        failing = set()
+        for test in sorted(self.tests):
+            begin = time.monotonic()
+            if self.fails(test, 0):
+                failing.add(test)
+            self.seconds[test] = time.monotonic() - begin
+        return failing
+
+    def killer(self, tests, number):
         """The first test that fails, or None."""
-        environment = dict(os.environ, HAPODE_MUTANT=str(number))
-        for test in tests:
-            run = subprocess.run(["meson", "test", "-C", self.build, "--no-rebuild", test],
-                                 env=environment, capture_output=True, text=True)
-            if run.returncode != 0:
-                return test
-        return None
+        return next((test for test in tests if self.fails(test, number)), None)
 
 
 def find_mutants(root, scratch, only):
@@ -203,7 +236,7 @@ def find_mutants(root, scratch, only):
     for pattern, tests in AREAS:
         expression = re.compile(pattern.replace(".", r"\.").replace("*", "[^/]*") + "$")
         for path in filter(expression.match, files):
-            if path in found or only not in path:
+            if path in found or not any(text in path for text in only.split(",")):
                 continue
             found[path] = places_of(path, scratch.read(path), tests)
             for mutant in (m for place in found[path] for m in place[3]):
@@ -234,13 +267,13 @@ def build_all(scratch, found):
     sys.exit("the mutants do not build")
 
 
-def passes_alone(scratch, found, mutant, tests):
-    """One that must be built: then it is the only one in its file."""
+def killed_alone(scratch, found, mutant, tests):
+    """By which test. One that must be built: then it is the only one in its file."""
     source = scratch.read(mutant.path)
     place = next(p for p in found[mutant.path] if mutant in p[3])
     scratch.write(mutant.path, source[:place[0]] + ten_times(mutant) + source[place[1]:])
     said = scratch.make()
-    result = "it does not build" if said else scratch.passes(tests, 0)
+    result = "it does not build" if said else scratch.killer(tests, 0)
     scratch.write(mutant.path, mutate(source, found[mutant.path]))
     return result
 
@@ -272,12 +305,11 @@ def main():
     if options.list:
         print("\n".join(m.key() for m in mutants))
         return 0
-    there = scratch.look({t for m in mutants for t in m.tests})
+    scratch.look({t for m in mutants for t in m.tests})
     build_all(scratch, found)
-    used = sorted({t for m in mutants for t in m.tests if t in there})
-    failing = [t for t in used if scratch.passes([t], 0)]
+    failing = scratch.measure()
     if failing:
-        print("# these fail without a mutant and are not used: " + " ".join(failing))
+        print("# these fail without a mutant and are not used: " + " ".join(sorted(failing)))
     step = max(1, len(mutants) // options.sample) if options.sample else 1
     known = equivalents_of(root)
     survivors, tried, equivalent = [], 0, 0
@@ -289,9 +321,9 @@ def main():
             equivalent += 1
             continue
         tried += 1
-        tests = [t for t in mutant.tests if t in there and t not in failing]
-        by = (passes_alone(scratch, found, mutant, tests) if mutant.alone
-              else scratch.passes(tests, mutant.number))
+        tests = [t for t in mutant.tests if t in scratch.tests and t not in failing]
+        by = (killed_alone(scratch, found, mutant, tests) if mutant.alone
+              else scratch.killer(tests, mutant.number))
         print(f"{'killed by ' + by if by else 'SURVIVES'}: {mutant.key()}", flush=True)
         if by is None:
             survivors.append(mutant)
