@@ -300,8 +300,8 @@ TEST(boards_are_not_reset_by_the_lines_of_the_port_and_bytes_come_at_once)
   adapter = (struct adapter){true, TIOCM_RTS | TIOCM_DTR | TIOCM_CTS, 0x10};
   CHECK(hapi_spidar_serial_open(&r->serial, r->port, &detail) == HAP_OK);
   CHECK(adapter.lines == TIOCM_CTS && adapter.flags == (0x10 | ASYNC_LOW_LATENCY));
-  struct termios t;
-  CHECK(tcgetattr(r->serial.fd, &t) == 0);
+  struct termios t = {0};
+  REQUIRE(tcgetattr(r->serial.fd, &t) == 0);
   CHECK(cfgetospeed(&t) == B2000000 && cfgetispeed(&t) == B2000000);
   CHECK((t.c_cflag & (CRTSCTS | CSTOPB | HUPCL)) == 0 && (t.c_cflag & CLOCAL) != 0);
   CHECK((t.c_lflag & (ECHO | ICANON | ISIG)) == 0 && t.c_cc[VMIN] == 1);

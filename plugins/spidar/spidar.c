@@ -399,7 +399,8 @@ static void unwrap_counts(hapi_spidar_device *device)
   }
 }
 
-/* Where the grip is now: by the calibration that there is, else it is taken to be at home. */
+/* Where the grip is now: by the calibration that there is, else it is taken to be at home. A fit
+ * that does not arrive is none. */
 static bool settle_pose(hapi_spidar_device *device)
 {
   double counts[HAPI_SPIDAR_STRINGS_MAX];
@@ -412,14 +413,14 @@ static bool settle_pose(hapi_spidar_device *device)
       fit = solve_pose(device);
     }
   }
-  if (fit == HAPI_SPIDAR_FIT_POOR && !device->model_calibrated) {
+  if (fit != HAPI_SPIDAR_FIT_GOOD && !device->model_calibrated) {
     read_counts(device, counts);
     hapi_spidar_calibrate_at(&device->model, NULL, counts);
     device->model.calibrated = true;
     hapi_spidar_belief_begin(&device->belief, &device->model, NULL);
     fit = solve_pose(device);
   }
-  if (fit == HAPI_SPIDAR_FIT_POOR) {
+  if (fit != HAPI_SPIDAR_FIT_GOOD) {
     return false;
   }
   hap_pose grip = device->belief.solver.pose;

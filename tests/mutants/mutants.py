@@ -27,8 +27,8 @@ import time
 
 GUARD_TESTS = ["guard", "guard_session", "faults", "late", "false_input"]
 WATCH_TESTS = ["emergency", "watchdog", "guard_session", "module", "faults_threads"]
-SPIDAR_TESTS = ["spidar_errors", "spidar_frames", "spidar_emulator", "spidar", "false_input",
-                "spidar_the"]
+SPIDAR_TESTS = ["spidar_device", "spidar_errors", "spidar_frames", "spidar_emulator", "spidar",
+                "false_input", "spidar_the"]
 
 # Pattern of files: tests that should notice, the fast ones first.
 AREAS = [
@@ -40,7 +40,7 @@ AREAS = [
     ("lib/pointer/plausible.c", ["false_input", "faults", "late"]),
     ("lib/base/safety.h", GUARD_TESTS + WATCH_TESTS + SPIDAR_TESTS + ["spidar_guard"]),
     ("plugins/spidar/guard.c", ["spidar_guard", "spidar"]),
-    ("plugins/spidar/belief.c", ["false_input", "spidar_emulator", "spidar"]),
+    ("plugins/spidar/belief.c", ["spidar_device", "false_input", "spidar_emulator"]),
     ("plugins/spidar/serial.c", ["spidar_errors", "spidar", "spidar_emulator"]),
     ("plugins/spidar/line.c", ["spidar_emulator", "spidar_errors", "spidar"]),
     ("plugins/spidar/cycle.c", ["spidar_frames", "spidar_emulator", "spidar"]),
