@@ -77,6 +77,8 @@ static void *real_symbol(const char *name)
 
 static const char *latency_file; /* stands for that of sysfs; NULL: there is none */
 
+/* NOLINTBEGIN(readability-inconsistent-declaration-parameter-name): the system's begin with _ */
+
 int open(const char *path, int flags, ...)
 {
   int (*real)(const char *, int, mode_t);
@@ -92,8 +94,6 @@ int open(const char *path, int flags, ...)
   }
   return real(path, flags, mode);
 }
-
-/* NOLINTBEGIN(readability-inconsistent-declaration-parameter-name): the system's begin with _ */
 
 int dup3(int from, int to, int flags)
 {
@@ -442,7 +442,7 @@ static char listed[3][8] = {"ttyS0", "ttyUSB0", "ttyACM1"};
 static bool list_fails;
 static int lists; /* that nobody has freed */
 
-enum sp_return sp_list_ports(struct sp_port ***out)
+enum sp_return sp_list_ports(struct sp_port ***list_ptr)
 {
   static struct sp_port *ports[4];
   if (list_fails) {
@@ -452,7 +452,7 @@ enum sp_return sp_list_ports(struct sp_port ***out)
     ports[i] = (struct sp_port *)(void *)listed[i];
   }
   ports[3] = NULL;
-  *out = ports;
+  *list_ptr = ports;
   ++lists;
   return SP_OK;
 }
