@@ -7,7 +7,8 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-extern void __gcov_dump(void); /* NOLINT(bugprone-reserved-identifier): of the compiler */
+/* Of the compiler. NOLINTNEXTLINE(bugprone-reserved-identifier,readability-identifier-naming) */
+extern void __gcov_dump(void);
 
 /* NOLINTNEXTLINE(readability-inconsistent-declaration-parameter-name) */
 void _exit(int code)
