@@ -125,6 +125,87 @@ TEST(a_world_has_one_session_at_a_time)
 }
 
 /* A create that fails leaves the world free. */
+/* ---- a world that is destroyed before its session ---- */
+
+static char world_errors[2][600];
+static atomic_int world_error_count;
+
+static void keep_error(hap_log_level level, const char *text, void *user)
+{
+  (void)user;
+  int i = level == HAP_LOG_ERROR ? atomic_fetch_add(&world_error_count, 1) : 2;
+  if (i < 2) {
+    snprintf(world_errors[i], sizeof world_errors[i], "%s", text);
+  }
+}
+
+static void stage_lose_world(stage *s)
+{
+  CHECK(hap_session_lock(s->session) == HAP_OK || s->def.drive == HAP_DRIVE_LOCKSTEP);
+  dSpaceDestroy(s->space);
+  dWorldDestroy(s->world);
+  (void)hap_session_unlock(s->session);
+}
+
+static void stage_forget(void *owned)
+{
+  (void)owned;
+}
+
+static void stage_go_on(stage *s)
+{
+  for (int i = 0; i < 50; ++i) {
+    if (s->def.drive == HAP_DRIVE_LOCKSTEP) {
+      (void)hap_session_advance(s->session, 20);
+    } else if (s->def.drive == HAP_DRIVE_FRAME) {
+      (void)hap_session_update(s->session, 0.02);
+    }
+    sleep_ms(s->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : 5);
+  }
+}
+
+TEST(a_session_whose_world_is_destroyed_says_so_and_touches_it_no_more)
+{
+  static const hap_drive drives[] = {HAP_DRIVE_LOCKSTEP, HAP_DRIVE_FRAME, HAP_DRIVE_THREADS};
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.log = keep_error;
+  REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
+  for (size_t i = 0; i < 2 * sizeof drives / sizeof drives[0]; ++i) {
+    bool goes_on = i % 2 == 0;
+    stage *s = tap_own(sizeof *s, stage_forget);
+    stage_run(s, drives[i / 2]);
+    (void)add_hand(s, ~0u);
+    stage_go_on(s);
+    stage_lose_world(s);
+    atomic_store(&world_error_count, 0);
+    int steps = atomic_load(&s->steps);
+    if (goes_on) {
+      stage_go_on(s);
+      CHECK(stats_of(s).faults.fault == HAP_FAULT_WORLD);
+      CHECK(text_has(detail_of(s), "world was destroyed"));
+      CHECK(atomic_load(&s->steps) == steps); /* nor are callbacks called */
+      CHECK(hap_session_stop(s->session) == HAP_OK);
+      CHECK(hap_session_start(s->session) == HAP_ERROR_WORLD);
+    }
+    hap_session_destroy(s->session);
+    CHECK(atomic_load(&world_error_count) == 1 && text_has(world_errors[0], "was destroyed"));
+  }
+  REQUIRE(hap_hooks_set(NULL) == HAP_OK);
+}
+
+TEST(a_session_that_was_stopped_needs_no_world_any_more)
+{
+  stage *s = tap_own(sizeof *s, stage_forget);
+  stage_run(s, HAP_DRIVE_LOCKSTEP);
+  CHECK(hap_session_advance(s->session, 100) == HAP_OK);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  dSpaceDestroy(s->space);
+  dWorldDestroy(s->world);
+  hap_session_destroy(s->session);
+  CHECK(atomic_load(&s->steps) > 0);
+}
+
 TEST(a_session_that_could_not_be_created_has_no_claim_on_the_world)
 {
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);

@@ -18,6 +18,8 @@
 #include "device/device.h"
 #include "device/emergency.h"
 #include "device/watchdog.h"
+#include "haptic/haptic_internal.h"
+#include "session/session_internal.h"
 #include "tests/stage.h"
 
 #define DEVICES 2
@@ -276,6 +278,56 @@ TEST(a_pulse_tells_where_the_loop_is)
     CHECK(hapi_pulse_phase(hapi_pulse_look(&pulse)) == HAPI_PHASE_WRITE);
     CHECK(hapi_pulse_index(hapi_pulse_look(&pulse)) == i);
   }
+}
+
+/* ---- where the loop stands still ---- */
+
+static uint64_t word_of(hapi_phase phase, uint32_t index)
+{
+  hapi_pulse pulse = {0};
+  hapi_pulse_beat(&pulse, phase, index);
+  return hapi_pulse_look(&pulse);
+}
+
+TEST(a_standstill_is_told_by_where_the_loop_is)
+{
+  static const struct {
+    hapi_phase phase;
+    uint32_t index;
+    uint64_t pointer; /* of the fault */
+    const char *text;
+  } rows[] = {{HAPI_PHASE_READ, 0, 1, "device  did not come back from read"},
+              {HAPI_PHASE_WRITE, 1, 2, "device  did not come back from write"},
+              {HAPI_PHASE_READ, 60, 0, "a tick did not come to its end"},
+              {HAPI_PHASE_TICK, 0, 0, "a tick did not come to its end"},
+              {HAPI_PHASE_WAIT, 0, 0, "was not woken"}};
+  hap_detail text = {""};
+  stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+  REQUIRE(stage_create(s) == HAP_OK);
+  hapi_haptic *haptic = s->session->haptic;
+  hapi_haptic_where(haptic, &text);
+  CHECK(strcmp(text.text, "a device did not come back from zero") == 0); /* of no standstill */
+  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+    hapi_loop_standstill taken;
+    uint64_t word = word_of(rows[i].phase, rows[i].index);
+    atomic_store(&haptic->standstill.happened, word);
+    hapi_haptic_where(haptic, &text);
+    CHECK_SAY(text_has(text.text, rows[i].text), "%s", text.text);
+    CHECK(stats_of(s).faults.fault == HAP_FAULT_NONE && !hapi_standstill_pending(haptic));
+    atomic_store(&haptic->standstill.blocked, word);
+    hap_stats stats = stats_of(s);
+    CHECK(stats.faults.fault == HAP_FAULT_BLOCKED && stats.faults.count == 1);
+    CHECK((stats.faults.pointer & 0xffffffffu) == rows[i].pointer);
+    stats.faults.fault = HAP_FAULT_WORLD; /* another one was first */
+    stats.faults.pointer = 0;
+    hapi_standstill_stats(haptic, &stats);
+    CHECK(stats.faults.fault == HAP_FAULT_WORLD && stats.faults.count == 1);
+    hapi_standstill_take(haptic, &taken);
+    CHECK(taken.blocked && taken.pointer == rows[i].pointer && !hapi_standstill_pending(haptic));
+    hapi_standstill_take(haptic, &taken);
+    CHECK(!taken.blocked && taken.pointer == 0);
+  }
+  stage_end(s);
 }
 
 /* ---- a device that hangs ---- */

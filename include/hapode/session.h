@@ -78,8 +78,10 @@ HAP_API void hap_session_def_init(hap_session_def *def, size_t size_of_def);
 /* [control] Stops, writes zero force to every device, and frees. NULL is allowed. A lock that this
  * thread holds is released. Posted edits that still wait are run. The world goes back to the
  * application as it is, with ODE's auto-disable as it was found. In a callback it does nothing.
- * Before dWorldDestroy, dSpaceDestroy and dCloseODE: a session whose world is gone reads freed
- * memory, and nothing can tell it so. */
+ * Before dCloseODE. A session that runs, or was not stopped, when dWorldDestroy is called latches
+ * HAP_FAULT_WORLD and touches world and space no more, which is logged as an error; the call needs
+ * the lock (hap_session_lock), or the session's threads may be in the world. Without its space
+ * alone a session that runs reads freed memory. */
 HAP_API void hap_session_destroy(hap_session *session);
 
 /* ---- running ---- */

@@ -71,6 +71,16 @@ static bool world_is_sound(hapi_physics *physics)
   return false;
 }
 
+/* Nothing of it is touched then. */
+static bool world_is_there(hapi_physics *physics)
+{
+  if (!hapi_world_is_gone(&physics->world)) {
+    return true;
+  }
+  physics->config.report(physics->config.user, HAP_FAULT_WORLD, HAPI_WORLD_GONE_TEXT);
+  return false;
+}
+
 static void step_part(hapi_physics *physics, double part_s)
 {
   hapi_meant meant;
@@ -294,6 +304,9 @@ static void note_times(hapi_physics *physics, const double seconds[5], double lo
 static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
   HAPI_ASSERT(physics->world.begun && hapi_lock_in_callback(&physics->lock));
+  if (!world_is_there(physics)) {
+    return;
+  }
   stopwatch watch = {hapi_clock_now()};
   double seconds[5] = {0.0};
   /* Those of the last step: what looks at the bodies' joints has that many less to look at. */

@@ -47,6 +47,9 @@ void hapi_physics_listen(hapi_physics *physics)
 
 hap_status hapi_physics_scan(hapi_physics *physics, bool syncs)
 {
+  if (hapi_world_is_gone(&physics->world)) {
+    return HAP_OK; /* there is nothing to scan */
+  }
   pthread_mutex_lock(&physics->drawing.lock);
   hap_status status = hapi_bodies_scan(&physics->world, &physics->cycle, syncs);
   pthread_mutex_unlock(&physics->drawing.lock);
@@ -74,6 +77,9 @@ bool hapi_physics_is_unsound(const hapi_physics *physics, hap_detail *out_text)
 void hapi_physics_run_edits(hapi_physics *physics)
 {
   HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
+  if (hapi_world_is_gone(&physics->world)) {
+    return; /* there is nothing to edit */
+  }
   uint32_t count = hapi_edits_waiting(&physics->edits); /* what one posts waits for the next step */
   hapi_tape_edits(&physics->tape, count);
   physics->lock.editable = true;

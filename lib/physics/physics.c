@@ -117,7 +117,14 @@ void hapi_physics_destroy(hapi_physics *physics)
 
 static void give_world_back(hapi_physics *physics)
 {
-  dJointGroupEmpty(physics->world.contact_group);
+  dJointGroupEmpty(physics->world.contact_group); /* joints of a world that is gone, too */
+  physics->world.begun = false;
+  hapi_world_unwatch(&physics->world);
+  if (physics->world.gone) {
+    hapi_log(HAP_LOG_ERROR, HAPI_WORLD_GONE_TEXT);
+    hapi_islands_end(&physics->world);
+    return;
+  }
   /* What was destroyed since the last cycle must not be given anything back. */
   (void)hapi_physics_scan(physics, false); /* a body without memory for it was given nothing */
   const hapi_body_table *table = &physics->world.bodies;
@@ -132,7 +139,6 @@ static void give_world_back(hapi_physics *physics)
                                                  physics->world.islands_threads);
     physics->world.islands_threads = 0;
   }
-  physics->world.begun = false;
 }
 
 static void physics_prepare(hapi_physics *physics)
@@ -179,7 +185,11 @@ static void physics_prepare(hapi_physics *physics)
 
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail)
 {
+  if (physics->world.gone) {
+    return hapi_fail(detail, HAP_ERROR_WORLD, HAPI_WORLD_GONE_TEXT);
+  }
   physics->world.begun = true;
+  hapi_world_watch(&physics->world);
   hapi_carriers_reset(&physics->world.carriers); /* what was moved meanwhile stands */
   hapi_account_reset(&physics->account);
   hapi_feedback_reset(&physics->feedback);

@@ -26,6 +26,9 @@
 #include "research/cross.h"
 #include "world/world.h"
 
+#define HAPI_WORLD_GONE_TEXT \
+  "the ODE world was destroyed while a session steps it: stop or destroy the session first"
+
 /* Bodies whose positions are traced: body table entries. */
 typedef struct hapi_watch {
   uint32_t bodies[HAP_TRACE_BODIES_MAX]; /* HAPI_NONE: it is gone */

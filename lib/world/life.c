@@ -87,7 +87,9 @@ void hapi_islands_go_on(const hapi_world *world)
 void hapi_islands_end(hapi_world *world)
 {
   hapi_islands *islands = &world->islands;
-  hapi_islands_rest(world);
+  if (!world->gone) {
+    hapi_islands_rest(world);
+  }
   if (islands->threading != NULL) {
     dThreadingImplementationShutdownProcessing(islands->threading);
   }
@@ -152,6 +154,34 @@ void hapi_world_finish(hapi_world *world)
   hapi_free(world->surfaces);
   hapi_free(world->notes);
   hapi_free(world->contact_scratch);
+}
+
+/* ODE tells nobody that a world is destroyed. The bodies go with it, and each takes leave of its
+ * geoms: a geom of ours, in no space, is there still and has no body any more. */
+void hapi_world_watch(hapi_world *world)
+{
+  HAPI_ASSERT(world->witness == NULL && !world->gone);
+  dBodyID body = dBodyCreate(world->ode.world);
+  dBodyDisable(body); /* it is in no island */
+  world->witness = dCreateSphere(NULL, 1.0);
+  dGeomSetBody(world->witness, body);
+}
+
+bool hapi_world_is_gone(hapi_world *world)
+{
+  world->gone = world->gone || (world->witness != NULL && dGeomGetBody(world->witness) == NULL);
+  return world->gone;
+}
+
+void hapi_world_unwatch(hapi_world *world)
+{
+  if (world->witness != NULL) {
+    if (!hapi_world_is_gone(world)) {
+      dBodyDestroy(dGeomGetBody(world->witness));
+    }
+    dGeomDestroy(world->witness);
+    world->witness = NULL;
+  }
 }
 
 void hapi_world_step(hapi_world *world, double step_s)

@@ -56,7 +56,9 @@ typedef struct hapi_islands {
 struct hapi_world {
   hap_ode_def ode;
   hapi_claim claim;
-  bool begun; /* a session has taken the world over, and the bodies' sleep with it */
+  bool begun;      /* a session has taken the world over, and the bodies' sleep with it */
+  bool gone;       /* the application has destroyed the world, and nothing of it may be touched */
+  dGeomID witness; /* on a disabled body of ours, while begun; NULL: there is none */
   hapi_body_table bodies;
   hapi_carriers carriers;
   hapi_joint_table joints;
@@ -76,7 +78,12 @@ bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint
                        const hapi_world_listener *listener);
 void hapi_world_finish(hapi_world *world);
 void hapi_world_step(hapi_world *world, double step_s); /* the global step */
-double hapi_body_mass(dBodyID body);                    /* 0 for a kinematic one */
+
+/* life.c: whether there is a world still. From watch to unwatch a destroyed one is noticed. */
+void hapi_world_watch(hapi_world *world);
+bool hapi_world_is_gone(hapi_world *world);
+void hapi_world_unwatch(hapi_world *world);
+double hapi_body_mass(dBodyID body); /* 0 for a kinematic one */
 
 /* life.c: the body that a geom is of for the loop: its own, or its carrier; NULL: it is static */
 dBodyID hapi_geom_body(const hapi_world *world, dGeomID geom);
