@@ -195,6 +195,8 @@ TEST(bad_specs_with_failing_allocations)
       "replay:/nonexistent/hand.csv",
       "replay:/dev/null",
       "replay:/dev/zero",
+      "spidar:/dev/null",
+      "spidar:/dev/null,model=x9",
   };
   for (size_t i = 0; i < sizeof specs / sizeof specs[0]; ++i) {
     bad_spec = specs[i];

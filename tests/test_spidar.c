@@ -93,6 +93,15 @@ static bool status_explains(const hands *h, const char *word)
 
 /* ---- specs ---- */
 
+static void spec_refused(const char *spec, const char *word)
+{
+  hap_device *device = NULL;
+  hap_detail detail = {""};
+  hap_status status = hap_device_open(spec, &device, &detail);
+  CHECK_SAY(status < HAP_OK && device == NULL && strstr(detail.text, word) != NULL, "%s: %s", spec,
+            detail.text);
+}
+
 TEST(wrong_arguments_are_refused_before_a_port_is_touched)
 {
   static const struct {
@@ -110,15 +119,36 @@ TEST(wrong_arguments_are_refused_before_a_port_is_touched)
               {"spidar:/dev/null,rotate=0/0/0/0", "rotate"},
               {"spidar:/dev/null,offset=1/2", "offset"},
               {"spidar:/dev/null,max_force=-1", "max_force"}};
+  char longest[700];
+  char dots[400];
   for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
-    hap_device *device = NULL;
-    hap_detail detail = {""};
-    CHECK(hap_device_open(rows[i].spec, &device, &detail) < HAP_OK && device == NULL);
-    if (strstr(detail.text, rows[i].word) == NULL) {
-      printf("# %s: %s\n", rows[i].spec, detail.text);
-    }
-    CHECK(strstr(detail.text, rows[i].word) != NULL);
+    spec_refused(rows[i].spec, rows[i].word);
   }
+  memset(dots, '.', sizeof dots - 1);
+  dots[sizeof dots - 1] = '\0';
+  snprintf(longest, sizeof longest, "spidar:/dev/null,model=%s", dots);
+  spec_refused(longest, "the path is too long");
+  snprintf(longest, sizeof longest, "spidar:%s", dots);
+  spec_refused(longest, "the name of the port is too long");
+}
+
+TEST(limits_are_lowered_and_never_raised)
+{
+  hands h;
+  hap_detail detail = {""};
+  hap_device_info own;
+  hap_device_info info;
+  REQUIRE(open_device(&h, "", &detail));
+  REQUIRE(hap_device_get_info(h.device, &own, sizeof own) == HAP_OK);
+  hap_device_close(h.device);
+  REQUIRE(open_device(&h, ",max_force=1.5,max_torque=0.02", &detail));
+  REQUIRE(hap_device_get_info(h.device, &info, sizeof info) == HAP_OK);
+  CHECK(info.max_force == 1.5 && info.max_torque == 0.02);
+  hap_device_close(h.device);
+  REQUIRE(open_device(&h, ",max_force=500,max_torque=50", &detail));
+  REQUIRE(hap_device_get_info(h.device, &info, sizeof info) == HAP_OK);
+  CHECK(info.max_force == own.max_force && info.max_torque == own.max_torque);
+  hap_device_close(h.device);
 }
 
 TEST(the_port_is_found_and_is_for_one_alone)

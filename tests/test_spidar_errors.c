@@ -20,6 +20,7 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include <hapode/device.h>
 #include <hapode/hooks.h>
 
 #include "plugins/spidar/serial.h"
@@ -473,6 +474,16 @@ enum sp_transport sp_get_port_transport(const struct sp_port *port)
   return strncmp((const char *)port, "ttyS", 4) == 0 ? SP_TRANSPORT_NATIVE : SP_TRANSPORT_USB;
 }
 
+static bool none_found(const char *word)
+{
+  hap_device *device = NULL;
+  hap_detail detail = {""};
+  hap_status status = hap_device_open("spidar", &device, &detail);
+  CHECK_SAY(status == HAP_ERROR_DEVICE && device == NULL && strstr(detail.text, word) != NULL,
+            "\"%s\" is not in \"%s\"", word, detail.text);
+  return status < HAP_OK;
+}
+
 static bool port_is(int index, const char *wanted)
 {
   char path[HAPI_SPIDAR_PATH_MAX] = "";
@@ -492,8 +503,9 @@ TEST(usb_adapters_alone_are_looked_at)
   list_fails = true;
   CHECK(port_is(0, "/my/port") && port_is(1, NULL));
   unsetenv("HAPODE_SPIDAR_PORT");
-  CHECK(port_is(0, NULL));
+  CHECK(port_is(0, NULL) && none_found("there is no serial port of a USB adapter"));
   list_fails = false;
+  CHECK(none_found("ttyUSB0: No such file") && none_found("; ttyACM1: No such file"));
 }
 
 #endif

@@ -15,7 +15,8 @@ static int reply_length(const hapi_spidar_boards *boards, int index)
 static int motors_of(const hapi_spidar_boards *boards, int index)
 {
   const hapi_spidar_kind *kind = hapi_spidar_kind_find(boards->model[index]);
-  return kind != NULL ? kind->motors : 0;
+  HAPI_ASSERT(kind != NULL); /* boards of other models are not listed */
+  return kind->motors;
 }
 
 void hapi_spidar_cycle_init(hapi_spidar_cycle *cycle, const hapi_spidar_boards *boards)
