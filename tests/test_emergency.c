@@ -78,6 +78,21 @@ TEST(each_device_is_zeroed_once_an_emergency)
   CHECK(hapi_emergencies() == before + 7);
 }
 
+TEST(one_device_is_zeroed_alone_and_only_while_it_is_there)
+{
+  memset(devices, 0, sizeof devices);
+  CHECK(hapi_emergency_add(&counted_ops, &devices[0]) &&
+        hapi_emergency_add(&counted_ops, &devices[1]));
+  hapi_emergency_zero_one(&counted_ops, &devices[1]);
+  hapi_emergency_zero_one(&counted_ops, &devices[2]); /* nobody knows it */
+  CHECK(!hapi_emergency_is_zeroing(&counted_ops, &devices[1]));
+  CHECK(hapi_emergency_remove(&counted_ops, &devices[0]) &&
+        hapi_emergency_remove(&counted_ops, &devices[1]));
+  hapi_emergency_zero_one(&counted_ops, &devices[1]);
+  CHECK(atomic_load(&devices[0].zeros) == 0 && atomic_load(&devices[1].zeros) == 1 &&
+        atomic_load(&devices[2].zeros) == 0);
+}
+
 TEST(there_is_room_for_64)
 {
   memset(devices, 0, sizeof devices);

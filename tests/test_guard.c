@@ -125,6 +125,96 @@ TEST(a_million_random_wrenches_keep_limit_and_slew)
   CHECK(f.tick.guard.latch.count == 200);
 }
 
+TEST(torque_has_bounds_of_its_own)
+{
+  hapi_pointer *p = guarded_and_warm();
+  p->device.feels_torque = true;
+  for (int i = 1; i <= 3; ++i) {
+    hapi_v3_set(p->wrench.force, 0.0, 0.0, 0.0);
+    hapi_v3_set(p->wrench.torque, 0.0, 0.0, 3.0);
+    hapi_tick_guard(&f.tick);
+    check_v3(p->device.wrench.torque, 0.0, 0.0, fmin(0.5 * i, 1.0), 1e-12);
+    CHECK((p->guard.flags & HAP_GUARD_SLEW) != 0);
+    CHECK(((p->guard.flags & HAP_GUARD_SATURATED) != 0) == (i == 3));
+  }
+  p->device.limits.slew_torque = 1e6;
+  hapi_v3_set(p->wrench.torque, 0.0, 0.0, 3.0);
+  hapi_tick_guard(&f.tick);
+  CHECK(p->guard.flags == HAP_GUARD_SATURATED);
+  check_v3(p->device.wrench.torque, 0.0, 0.0, 1.0, 1e-12);
+}
+
+TEST(a_wrench_is_used_as_long_as_each_of_its_numbers_can_be)
+{
+  for (int i = 0; i < 2; ++i) {
+    hapi_pointer *p = guarded_and_warm();
+    p->device.feels_torque = true;
+    double *wanted = i == 0 ? p->wrench.force : p->wrench.torque;
+    for (int k = 0; k < 3; ++k) {
+      hapi_v3_set(wanted, 0.9e12, 0.9e12, 0.9e12); /* their sum of squares is beyond */
+      hapi_tick_guard(&f.tick);
+    }
+    CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE);
+    const double *given = i == 0 ? p->device.wrench.force : p->device.wrench.torque;
+    CHECK_NEAR(hapi_v3_norm(given), i == 0 ? LIMIT : 1.0, 1e-9);
+    hapi_v3_set(wanted, 0.0, 0.0, 1.1e12);
+    hapi_tick_guard(&f.tick);
+    CHECK(f.tick.guard.latch.fault == HAP_FAULT_FORCE);
+  }
+}
+
+/* Whatever went wrong between the first check and the last. */
+TEST(nothing_but_numbers_is_written)
+{
+  for (int i = 0; i < 2; ++i) {
+    hapi_pointer *p = guarded_and_warm();
+    guard_wrench(p, 5.0, 0.0, 0.0);
+    hapi_v3_set(p->wrench.force, 5.0, 0.0, 0.0);
+    hapi_guard_begin(&f.tick.guard, &f.tick.facts, &f.tick.pointers);
+    CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE);
+    (i == 0 ? p->device.wrench.force : p->device.wrench.torque)[1] = (double)NAN;
+    hapi_guard_write(&f.tick.guard, T, &f.tick.pointers);
+    CHECK(f.tick.guard.latch.fault == HAP_FAULT_FORCE && f.tick.guard.latch.pointer == 1);
+    CHECK(p->guard.flags == HAP_GUARD_FAULT);
+    check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0);
+    check_v3(p->device.wrench.torque, 0.0, 0.0, 0.0, 0.0);
+    check_v3(p->guard.written.force, 0.0, 0.0, 0.0, 0.0);
+  }
+}
+
+/* ---- a device that is not believed ---- */
+
+TEST(a_pointer_comes_in_when_its_device_is_believed)
+{
+  hapi_pointer *p = guarded_alone();
+  p->belief.doubted = true;
+  for (int i = 0; i < 30; ++i) {
+    guard_wrench(p, 10.0, 0.0, 0.0);
+    check_v3(p->device.wrench.force, 0.0, 0.0, 0.0, 0.0);
+    CHECK((p->guard.flags & HAP_GUARD_INPUT) != 0);
+  }
+  p->belief.doubted = false;
+  for (int i = 1; i <= 20; ++i) {
+    guard_wrench(p, 10.0, 0.0, 0.0);
+    check_v3(p->device.wrench.force, 0.5 * i, 0.0, 0.0, 1e-9);
+  }
+  p->belief.doubted = true; /* one that is in already stays */
+  guard_wrench(p, 10.0, 0.0, 0.0);
+  check_v3(p->device.wrench.force, 10.0, 0.0, 0.0, 1e-9);
+}
+
+TEST(a_torque_that_no_motion_explains_comes_in_slowly)
+{
+  hapi_pointer *p = guarded_and_warm();
+  p->device.feels_torque = true;
+  p->belief.doubt_s = 0.01;
+  hapi_v3_set(p->wrench.force, 0.0, 0.0, 0.0);
+  hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.5);
+  hapi_tick_guard(&f.tick);
+  check_v3(p->device.wrench.torque, 0.0, 0.0, 1.0 / 30.0, 1e-9);
+  CHECK((p->guard.flags & HAP_GUARD_INPUT) != 0);
+}
+
 TEST(a_force_beyond_the_limit_comes_to_it_in_its_own_direction)
 {
   hapi_pointer *p = guarded_and_warm();

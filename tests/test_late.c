@@ -171,6 +171,17 @@ TEST(a_fault_latches_after_one_gap_of_more_than_50_ms_under_force)
   CHECK(ticks_to_fault(300, 1000, false) == 0);
 }
 
+TEST(a_torque_is_a_force_that_is_held_too)
+{
+  hapi_pointer *p = late_pointer();
+  p->guard.written.force[0] = 0.0;
+  (void)late_tick(60);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_NONE); /* nothing is held */
+  p->guard.written.torque[1] = 0.01;
+  (void)late_tick(60);
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_LATE);
+}
+
 TEST(a_reset_forgives_what_was_lost)
 {
   (void)ticks_to_fault(3, 1, true);

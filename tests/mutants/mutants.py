@@ -148,6 +148,7 @@ class Scratch:
         self.root = root
         self.tree = os.path.join(folder, "tree")
         self.build = os.path.join(folder, "build")
+        self.texts = {}
         self.needed = []
         self.tests = {}
         self.seconds = {}
@@ -174,8 +175,11 @@ class Scratch:
             f.write(text)
 
     def read(self, path):
-        with open(os.path.join(self.root, path), encoding="utf-8") as f:
-            return f.read()
+        """As it was copied: somebody may work in the root meanwhile."""
+        if path not in self.texts:
+            with open(os.path.join(self.tree, path), encoding="utf-8") as f:
+                self.texts[path] = f.read()
+        return self.texts[path]
 
     def look(self, wanted):
         """Which of these tests there are; what they need is built from then on."""
