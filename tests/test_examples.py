@@ -20,6 +20,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "record_and_play": "docs/recording.md",
     "try_device": "docs/devices.md",
     "edit_while_running": "docs/editing.md",
+    "sound_on_touch": "docs/touches.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -113,6 +114,17 @@ def check_late_ticks(program):
     out = run(program)
     said = re.search(r"^(\d+) ticks, (\d+) missed;", out, re.M)
     point(said is not None and int(said.group(1)) > 100, "it counts ticks", out)
+
+
+def check_sound_on_touch(program):
+    out = run(program)
+    clicks = rows_of(out, r"^\S+ s  click of wood, (\d+) mN s at ([0-9.]+) m/s$")
+    point(len(clicks) >= 2 and float(clicks[1][0]) > float(clicks[0][0]), "a harder tap is louder",
+          out)
+    point("scraping on wood begins" in out and "scraping on wood ends" in out, "a stroke scrapes",
+          out)
+    said = re.search(r"^at last on wood with ([0-9.]+) N, of which ([0-9.]+) N rub$", out, re.M)
+    point(said is not None and 2.5 < float(said.group(1)) < 3.5, "the finger rests on it", out)
 
 
 def check_record_and_play(program):

@@ -17,6 +17,7 @@
 #include <hapode/session.h>
 #include <hapode/spatial.h>
 #include <hapode/status.h>
+#include <hapode/touches.h>
 
 #ifndef dDOUBLE
 #error "hapode needs ODE in double precision (define dIDEDOUBLE, or use ode.pc of such a build)"
@@ -167,6 +168,11 @@ HAP_API hap_status hap_session_poses(hap_session *session, int64_t time_ns, cons
  * with the next step, and may overlap meanwhile. HAP_STALE: physics is late by more than a step. */
 HAP_API hap_status hap_session_poses_now(hap_session *session, const dBodyID *bodies, size_t count,
                                          hap_pose *out);
+
+/* [any] Who moves the bodies, in the newest model of the loop. HAP_ERROR_NOT_FOUND: as
+ * hap_session_poses. */
+HAP_API hap_status hap_session_roles(hap_session *session, const dBodyID *bodies, size_t count,
+                                     hap_body_role *out);
 
 /* [locked, or control before start] Bodies whose positions go into the trace (hapode/trace.h), at
  * most HAP_TRACE_BODIES_MAX; replaces an earlier list. */

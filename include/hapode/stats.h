@@ -199,6 +199,11 @@ typedef struct hap_room_stats {
   uint32_t range_cut;      /* 1: the newest range ends there, and more bodies could be touched */
 } hap_room_stats;
 
+/* What is told to an application that asks (hapode/touches.h). */
+typedef struct hap_event_stats {
+  uint64_t dropped; /* events that found no room, and touches beyond HAP_TOUCHES_MAX in each tick */
+} hap_event_stats;
+
 /* All of it. */
 typedef struct hap_stats {
   uint32_t size; /* bytes filled in */
@@ -213,6 +218,7 @@ typedef struct hap_stats {
   hap_error_stats error;
   hap_safety_stats safety;
   hap_room_stats room;
+  hap_event_stats events;
 } hap_stats;
 
 /* [any] Copies the statistics into *out. size_of_out: sizeof *out of the caller's build. Each

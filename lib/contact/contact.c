@@ -245,6 +245,13 @@ static void pair_contact(const placed_pair *found, const hapi_near_pair *pair, i
   out->key = pair->key;
 }
 
+/* What its contacts have in common; their points are there. */
+static void patches_add_pair(const hapi_near_pair *pair, hapi_patches *out)
+{
+  hapi_patches_pairs(out)[out->surface_count] = pair->tags;
+  hapi_patches_surfaces(out)[out->surface_count++] = pair->surface;
+}
+
 static void fill_pair(const placed_pair *found, const hapi_near_pair *pair, hapi_patches *out)
 {
   for (int i = 0; i < found->patch.count; ++i) {
@@ -252,7 +259,7 @@ static void fill_pair(const placed_pair *found, const hapi_near_pair *pair, hapi
     pair_contact(found, pair, i, c);
     c->surface = out->surface_count;
   }
-  hapi_patches_surfaces(out)[out->surface_count++] = pair->surface;
+  patches_add_pair(pair, out);
 }
 
 /* Neighbours in a mesh share their corners and edges, and each of them finds the point there. */
@@ -316,7 +323,7 @@ static uint32_t fill_group(hapi_contact *contact, uint32_t first, uint64_t *io_w
       *c = group->contacts[i];
       c->surface = out->surface_count;
     }
-    hapi_patches_surfaces(out)[out->surface_count++] = pairs[first].surface;
+    patches_add_pair(&pairs[first], out);
   }
   return end;
 }
@@ -494,6 +501,7 @@ static void tool_pair_add(const hapi_contact *contact, const placed_tool *tool,
     out->pointer_generation = tool->in->generation;
     out->same_within = hapi_tool_same_within(tool->in->extent);
     out->mu = pair->mu;
+    out->geom = pair->tag;
     hapi_touch_localise(&a, &b, &patch.points[i], &out->at);
     out->at.key = pair->key;
     out->at.body_a = HAPI_SLOT_NONE;

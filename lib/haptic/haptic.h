@@ -12,6 +12,7 @@
 #include <hapode/pointer.h>
 #include <hapode/session.h>
 #include <hapode/stats.h>
+#include <hapode/touches.h>
 #include <hapode/trace.h>
 
 #include "base/pointer_setup.h"
@@ -75,6 +76,14 @@ bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id);
  * than grace_ns; HAP_ERROR_NOT_FOUND: also while no tick has had the pointer. */
 hap_status hapi_haptic_pointer_poses(hapi_haptic *haptic, hap_pointer_id id, int64_t time_ns,
                                      int64_t grace_ns, hap_pose out_proxy_device[2]);
+
+/* [any] touches.h: what was written, and HAP_STALE when nobody had asked before. */
+hap_status hapi_haptic_touches(hapi_haptic *haptic, hap_pointer_id id, hap_touch *touches,
+                               size_t capacity, size_t size_of_touch, size_t *out_count);
+hap_status hapi_haptic_contacts(hapi_haptic *haptic, hap_body_contact *contacts, size_t capacity,
+                                size_t size_of_contact, size_t *out_count);
+size_t hapi_haptic_read_events(hapi_haptic *haptic, hap_event *events, size_t capacity,
+                               size_t size_of_event);
 
 bool hapi_haptic_has_pointers(const hapi_haptic *haptic);
 

@@ -19,6 +19,7 @@
 #include "record/tape.h"
 #include "sync/triple_buffer.h"
 #include "tick/black_box.h"
+#include "tick/telling.h"
 #include "tick/tick.h"
 
 typedef enum hapi_pointer_phase {
@@ -125,6 +126,31 @@ typedef struct hapi_trace_ring {
   _Atomic uint64_t read;
 } hapi_trace_ring;
 
+/* What the application has asked for. */
+enum {
+  HAPI_ASKED_TOUCHES = 1,
+  HAPI_ASKED_CONTACTS = 2,
+  HAPI_ASKED_EVENTS = 4
+};
+
+/* Touches of a pointer, or contacts of bodies, at one tick. */
+typedef struct hapi_told_list {
+  hapi_triple_buffer buffer;
+  uint32_t counts[3];
+  uint32_t generations[3]; /* of the pointer */
+} hapi_told_list;
+
+/* What ticks tell the application, once it has asked. */
+typedef struct hapi_told_things {
+  _Atomic uint32_t asked;
+  pthread_mutex_t lock; /* between those who ask */
+  hapi_telling telling;
+  hapi_told_list *of_pointers;
+  hapi_told_list of_bodies;
+  hap_touch *touches;         /* HAP_TOUCHES_MAX for each place of each pointer's buffer */
+  hap_body_contact *contacts; /* likewise capacity.contacts for each place */
+} hapi_told_things;
+
 /* What watchdogs see of the loop and tell it. */
 typedef struct hapi_standstill {
   hapi_pulse pulse;          /* where the loop is */
@@ -156,6 +182,7 @@ struct hapi_haptic {
   _Atomic int reset_fault;
   _Atomic int outside_fault; /* hap_fault that another thread wants latched */
   hapi_standstill standstill;
+  hapi_told_things told;
   uint64_t emergencies; /* calls of hap_emergency_zero that the loop has seen */
   bool begun;
   int64_t start_ns;
@@ -215,6 +242,12 @@ void hapi_loop_effects_reset(hapi_haptic *haptic);
 void hapi_loop_sample_begin(hapi_haptic *haptic);
 void hapi_loop_sample_end(hapi_haptic *haptic, int64_t spent_ns);
 void hapi_loop_note_effects(hapi_haptic *haptic); /* after a model was adopted */
+
+/* told.c: what the application hears of a tick */
+bool hapi_told_create(hapi_haptic *haptic); /* false: no memory; destroy is due all the same */
+void hapi_told_destroy(hapi_haptic *haptic);
+void hapi_told_reset(hapi_haptic *haptic);   /* a session begins */
+void hapi_told_publish(hapi_haptic *haptic); /* [haptic] after a tick */
 
 /* standstill.c: the loop stands still; who looks is a watchdog */
 hap_status hapi_standstill_watch(hapi_haptic *haptic, uint32_t index);     /* starts its watchdog */

@@ -42,7 +42,8 @@ hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **ou
     pthread_mutex_init(&haptic->slots[i].lock, NULL);
   }
   bool tick = hapi_tick_memory_create(&haptic->tick, &config->capacity);
-  if (!tick || box->rows == NULL || box->counts == NULL || haptic->ring.rows == NULL ||
+  bool told = hapi_told_create(haptic);
+  if (!tick || !told || box->rows == NULL || box->counts == NULL || haptic->ring.rows == NULL ||
       haptic->slots == NULL) {
     hapi_haptic_destroy(haptic);
     return HAP_ERROR_MEMORY;
@@ -68,6 +69,7 @@ void hapi_haptic_destroy(hapi_haptic *haptic)
     (void)hapi_haptic_remove_pointer(haptic, id);
     pthread_mutex_destroy(&haptic->slots[i].lock);
   }
+  hapi_told_destroy(haptic);
   hapi_free(haptic->slots);
   hapi_free(haptic->ring.rows);
   hapi_free(haptic->black_box.rows);
@@ -150,6 +152,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   haptic->tick.pointers.high = 0;
   figures_reset(haptic);
   hapi_loop_effects_reset(haptic);
+  hapi_told_reset(haptic);
   pthread_mutex_lock(&haptic->black_box_lock);
   hapi_black_box_reset(&haptic->black_box);
   pthread_mutex_unlock(&haptic->black_box_lock);
@@ -375,6 +378,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_tick_report_trail(&haptic->tick, hapi_exchange_trail(haptic->config.exchange));
   hapi_tick_report_path(&haptic->tick, hapi_exchange_path(haptic->config.exchange));
   hapi_pointers_publish(haptic);
+  hapi_told_publish(haptic);
   trace_write(haptic);
   figures_publish(haptic);
   time_note(haptic, begin_ns);
@@ -438,6 +442,7 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   out->faults.slewed_ticks = LOAD(hand.slewed_ticks);
   out->faults.energy_ticks = LOAD(hand.energy_ticks);
   out->safety.derated_ticks = LOAD(hand.derated_ticks);
+  out->events.dropped = atomic_load(&haptic->told.telling.events.dropped);
   out->loop.realtime = atomic_load(&haptic->thread.realtime) ? 1 : 0;
   out->loop.trace_dropped = LOAD(loop.trace_dropped);
   out->loop.trace_hash = LOAD(loop.hash);

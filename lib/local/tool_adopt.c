@@ -192,6 +192,7 @@ static void tool_add(hapi_touches *touches, const hapi_bodies *bodies, const hap
   c->body = in->at.body_b;
   c->pointer = in->pointer;
   c->pointer_generation = in->pointer_generation;
+  c->asked.geom = in->geom;
   c->mu = in->mu;
   c->rubs = hapi_touch_rubs(in->mu, wishes);
   touches->rubs |= c->rubs;

@@ -68,7 +68,8 @@ typedef struct hapi_friction {
 typedef struct hapi_touch_shape {
   bool has; /* it is asked; else the shape may still be known, of a plane */
   hapi_shape shape;
-  hap_pose pose;  /* body frame */
+  hap_pose pose; /* body frame */
+  hapi_tag geom;
   hapi_told told; /* of its surface, into hapi_touches.triangles; where it is no shape */
 } hapi_touch_shape;
 

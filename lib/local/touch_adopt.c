@@ -40,6 +40,7 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
   memcpy(out->normal_body, in->normal_body, sizeof out->normal_body);
   memcpy(out->response.a, in->a, sizeof out->response.a);
   memcpy(out->response.turn, in->turn, sizeof out->response.turn);
+  out->asked.geom = in->geom;
   out->mu = in->mu;
   out->rubs = hapi_touch_rubs(in->mu, wishes);
   touches->rubs |= out->rubs;

@@ -198,6 +198,8 @@ static void add_pair(hapi_nearby *nearby, const hapi_link *link, uint32_t geom_a
               geom_holder(&geoms[geom_a]) + geom_holder(&geoms[geom_b]);
   pair->geom_a = turned ? geom_b : geom_a;
   pair->geom_b = turned ? geom_a : geom_b;
+  pair->tags = (hapi_pair_tags){.geom_a = turned ? link->other : link->own,
+                                .geom_b = turned ? link->own : link->other};
   pair->surface = link->surface;
 }
 
@@ -441,6 +443,7 @@ static void add_tool_pair(hapi_nearby *nearby, const hapi_hit *hit, uint32_t geo
   pair->key = hapi_tool_geom_key(nearby, hit->geom, hit->pointer);
   pair->tool = take_tool(nearby, hit->pointer);
   pair->geom = geom;
+  pair->tag = hit->geom;
   pair->mu = hit->mu;
 }
 

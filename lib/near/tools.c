@@ -612,6 +612,7 @@ static void slot_place(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_
   slot->mu = hit->mu;
   slot->tool = point->tool;
   slot->tool.mu = hit->mu;
+  slot->tool.geom = hit->geom;
   slot->tool.at.body_b = slot->body;
   slot->tool.at.generation_b =
       slot->body != HAPI_SLOT_NONE ? nearby->slots.bodies[slot->body].generation : 0;

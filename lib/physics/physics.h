@@ -13,6 +13,7 @@
 #include <hapode/effects.h>
 #include <hapode/session.h>
 #include <hapode/stats.h>
+#include <hapode/touches.h>
 
 #include "record/tape.h"
 #include "world/config.h"
@@ -76,6 +77,8 @@ hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxB
                               size_t count, hap_pose *out);
 hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
                                   hap_pose *out);
+hap_status hapi_physics_roles(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
+                              hap_body_role *out);
 int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns); /* [any] */
 
 /* session.h */

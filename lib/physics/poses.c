@@ -98,6 +98,19 @@ static void note_slot(const hapi_known_body *known, const hapi_slots *slots, hap
   }
 }
 
+static hap_body_role role_of(const hapi_body_slot *slot, hap_model model)
+{
+  bool local = slot->phase == HAPI_SLOT_LIVE &&
+               (model == HAP_MODEL_CONTACT || model == HAP_MODEL_ACCELERANCE);
+  bool rests = (slot->flags & HAPI_BODY_RESTING) != 0;
+  return !local                                    ? HAP_ROLE_WORLD
+         : (slot->flags & HAPI_BODY_DRIVEN) != 0   ? HAP_ROLE_DRIVEN
+         : model == HAP_MODEL_ACCELERANCE          ? HAP_ROLE_MEASURED
+         : (slot->flags & HAPI_BODY_OWNED) != 0    ? rests ? HAP_ROLE_RESTING : HAP_ROLE_LOOP
+         : (slot->flags & HAPI_BODY_MEASURED) != 0 ? HAP_ROLE_MEASURED
+                                                   : HAP_ROLE_EDGE;
+}
+
 static hap_pose *pose_in(const hapi_drawing *drawing, const hapi_drawn *drawn, uint64_t frame)
 {
   HAPI_ASSERT_INDEX(drawn - drawing->drawn, drawing->capacity);
@@ -136,6 +149,8 @@ void hapi_poses_publish(hapi_drawing *drawing, const hapi_world *world, const ha
       pushed = pushed && known->slot != HAPI_NONE && slots->bodies[known->slot].pushed;
       drawn->led = known->loop_owned || pushed ? drawn->led | bit : drawn->led & ~bit;
       note_slot(known, slots, drawn);
+      drawn->role = known->slot != HAPI_NONE ? role_of(&slots->bodies[known->slot], cycle->model)
+                                             : HAP_ROLE_WORLD;
       if (cycle->step_s > 0.0) { /* here, as each body is at hand */
         hapi_sleep_note(known);
       }
@@ -415,6 +430,19 @@ hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *b
                                   hap_pose *out)
 {
   return poses_draw(physics, NULL, bodies, count, out);
+}
+
+hap_status hapi_physics_roles(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
+                              hap_body_role *out)
+{
+  const hapi_body_table *table = &physics->world.bodies;
+  pthread_mutex_lock(&physics->drawing.lock);
+  bool known = all_known(&physics->drawing, table, bodies, count);
+  for (size_t i = 0; known && i < count; ++i) {
+    out[i] = physics->drawing.drawn[hapi_bodies_find(table, bodies[i])].role;
+  }
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return known ? HAP_OK : HAP_ERROR_NOT_FOUND;
 }
 
 int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns)

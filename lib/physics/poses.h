@@ -9,6 +9,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include <hapode/touches.h>
+
 #include "near/slots.h"
 #include "world/world.h"
 
@@ -21,6 +23,7 @@ typedef struct hapi_drawn {
   uint32_t led;            /* bits: in this frame the pose is only the loop's */
   uint32_t slots[2];       /* in the trail: now, and before */
   uint32_t generations[2]; /* 0: none */
+  hap_body_role role;
 } hapi_drawn;
 
 typedef struct hapi_frames {

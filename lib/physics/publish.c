@@ -166,6 +166,7 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, ha
   out->slot = index;
   out->generation = slot->generation;
   out->epoch = slot->epoch;
+  out->tag = dBodyGetWorld(body) == p->world->ode.world ? body : NULL; /* else a carrier */
   out->flags = slot->flags | (slot->pushed ? 0u : (uint32_t)HAPI_BODY_FOLLOWS);
   hapi_pose_read(body, &out->pose);
   hapi_twist_read(body, &out->twist);
@@ -206,6 +207,7 @@ static void fill_contact(const hapi_contact_slot *slot, const hapi_contact_answe
   hapi_v3_copy(slot->normal_body, out->normal_body);
   memcpy(out->a, answer->a, sizeof out->a);
   memcpy(out->turn, answer->turn, sizeof out->turn);
+  out->geom = slot->geom;
   out->mu = slot->mu;
   out->has_shape = slot->has_shape;
   out->hidden = slot->hidden;

@@ -259,6 +259,16 @@ hap_status hap_session_poses_now(hap_session *session, const dBodyID *bodies, si
                           __func__);
 }
 
+hap_status hap_session_roles(hap_session *session, const dBodyID *bodies, size_t count,
+                             hap_body_role *out)
+{
+  if (session == NULL || (count > 0 && (bodies == NULL || out == NULL))) {
+    return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
+  }
+  return hapi_session_say(session, hapi_physics_roles(session->physics, bodies, count, out),
+                          __func__);
+}
+
 hap_status hap_session_trace_bodies(hap_session *session, const dBodyID *bodies, size_t count)
 {
   HAPI_TRY(may_edit(session, bodies));

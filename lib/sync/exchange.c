@@ -85,6 +85,7 @@ static const message_array arrays[] = {
 #define PATCHES(...) ARRAY(HAPI_CHANNEL_PATCHES, hapi_patches, __VA_ARGS__)
     PATCHES(contacts_offset, contact_count, hapi_patch_contact, contacts),
     PATCHES(surfaces_offset, surface_count, hapi_surface, contacts),
+    PATCHES(pairs_offset, surface_count, hapi_pair_tags, contacts),
     PATCHES(tools_offset, tool_count, hapi_tool_point, tool_points),
 };
 

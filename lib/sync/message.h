@@ -17,6 +17,10 @@
 
 #define HAPI_SLOT_NONE 0xffffffffu
 
+/* A geom or body of the application: compared, and told to it again (hapode/touches.h). Nothing
+ * that is computed may depend on it. */
+typedef void *hapi_tag;
+
 typedef struct hapi_capacity {
   uint32_t bodies; /* slots: those of the range, and as many again around it */
   uint32_t contacts;

@@ -154,6 +154,7 @@ typedef struct hapi_model_body {
 
   double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
 
+  hapi_tag tag;    /* NULL: a body of the session itself */
   uint32_t course; /* of a driven one: 1 + index into the model's courses; 0: by its twist */
 
   /* Model CONTACT only. */
@@ -196,7 +197,8 @@ typedef struct hapi_model_contact {
   hapi_shape shape;      /* one with a closed form against a sphere */
   hap_pose shape_pose;   /* in the body's frame */
   uint32_t tool;         /* of a hull: 1 + index into the model's tool points; 0: of a sphere */
-  hapi_told told;        /* of the surface, where it is told in triangles */
+  hapi_tag geom;
+  hapi_told told; /* of the surface, where it is told in triangles */
 } hapi_model_contact;
 
 /* Cross accelerance: what a force at a pointer contact does to another body. */

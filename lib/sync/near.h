@@ -25,6 +25,7 @@ typedef struct hapi_near_pair {
   uint64_t key; /* the same for the life of the pair */
   uint32_t geom_a;
   uint32_t geom_b;
+  hapi_pair_tags tags;
   hapi_surface surface;
 } hapi_near_pair;
 
@@ -51,6 +52,7 @@ typedef struct hapi_near_tool_pair {
   uint64_t key; /* of a mesh: of all of its triangles */
   uint32_t tool;
   uint32_t geom;
+  hapi_tag tag;
   double mu; /* of its points */
 } hapi_near_tool_pair;
 

@@ -70,8 +70,14 @@ typedef struct hapi_tool_point {
   double same_within; /* m, pointer's frame: a new point matches an old one nearer than this */
   double mu;          /* friction of the pointer against the geom; 0: none */
   uint64_t group;     /* the same for the points of all pairs that adjoin, see tool_seams.h */
+  hapi_tag geom;
   hapi_patch_contact at;
 } hapi_tool_point;
+
+typedef struct hapi_pair_tags {
+  hapi_tag geom_a;
+  hapi_tag geom_b;
+} hapi_pair_tags;
 
 typedef struct hapi_patches {
   uint64_t number;       /* 1, 2, 3 ... */
@@ -83,11 +89,14 @@ typedef struct hapi_patches {
   uint32_t tool_count; /* of pointers that are hulls; those of a key follow each other */
   uint32_t contacts_offset;
   uint32_t surfaces_offset;
+  uint32_t pairs_offset;
   uint32_t tools_offset;
 } hapi_patches;
 
 HAPI_MESSAGE_ARRAY(hapi_patches_contacts, hapi_patches, hapi_patch_contact, contacts_offset)
 HAPI_MESSAGE_ARRAY(hapi_patches_surfaces, hapi_patches, hapi_surface, surfaces_offset)
+/* By surface. */
+HAPI_MESSAGE_ARRAY(hapi_patches_pairs, hapi_patches, hapi_pair_tags, pairs_offset)
 HAPI_MESSAGE_ARRAY(hapi_patches_tools, hapi_patches, hapi_tool_point, tools_offset)
 
 #endif
