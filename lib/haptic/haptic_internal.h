@@ -246,8 +246,8 @@ void hapi_loop_note_effects(hapi_haptic *haptic); /* after a model was adopted *
 /* told.c: what the application hears of a tick */
 bool hapi_told_create(hapi_haptic *haptic); /* false: no memory; destroy is due all the same */
 void hapi_told_destroy(hapi_haptic *haptic);
-void hapi_told_reset(hapi_haptic *haptic);   /* a session begins */
-void hapi_told_publish(hapi_haptic *haptic); /* [haptic] after a tick */
+void hapi_told_reset(hapi_haptic *haptic);                   /* a session begins */
+void hapi_told_publish(hapi_haptic *haptic, uint32_t asked); /* [haptic] after a tick */
 
 /* standstill.c: the loop stands still; who looks is a watchdog */
 hap_status hapi_standstill_watch(hapi_haptic *haptic, uint32_t index);     /* starts its watchdog */

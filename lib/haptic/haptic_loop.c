@@ -378,7 +378,10 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_tick_report_trail(&haptic->tick, hapi_exchange_trail(haptic->config.exchange));
   hapi_tick_report_path(&haptic->tick, hapi_exchange_path(haptic->config.exchange));
   hapi_pointers_publish(haptic);
-  hapi_told_publish(haptic);
+  uint32_t asked = atomic_load_explicit(&haptic->told.asked, memory_order_relaxed);
+  if (asked != 0) {
+    hapi_told_publish(haptic, asked);
+  }
   trace_write(haptic);
   figures_publish(haptic);
   time_note(haptic, begin_ns);

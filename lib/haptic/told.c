@@ -85,13 +85,9 @@ static void contacts_publish(hapi_haptic *haptic, hapi_told_things *told)
   hapi_triple_publish(&told->of_bodies.buffer);
 }
 
-void hapi_told_publish(hapi_haptic *haptic)
+void hapi_told_publish(hapi_haptic *haptic, uint32_t asked)
 {
   hapi_told_things *told = &haptic->told;
-  uint32_t asked = atomic_load_explicit(&told->asked, memory_order_relaxed);
-  if (asked == 0) {
-    return;
-  }
   if ((asked & (HAPI_ASKED_TOUCHES | HAPI_ASKED_EVENTS)) != 0) {
     hapi_telling_follow(&told->telling, &haptic->tick, (asked & HAPI_ASKED_EVENTS) != 0);
   }
