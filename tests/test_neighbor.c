@@ -294,6 +294,86 @@ TEST(reach_grows_with_speed)
   CHECK(!found_at(still + 0.5, 1.0, 2.0));
 }
 
+#define SWARM 24
+#define SWARM_HAND 2.0 /* m/s */
+
+/* Boxes at random places and velocities under a hand; the loop owns most of them. */
+static test_world *open_swarm(unsigned seed)
+{
+  test_world *w = world_new(0.0, 20);
+  const double edges[3] = {0.05, 0.04, 0.03};
+  dRandSetSeed(seed);
+  for (int i = 0; i < SWARM; ++i) {
+    dBodyID body = world_add_box(w, edges, 0.1, dRandReal(), dRandReal(), dRandReal());
+    dBodySetLinearVel(body, 4.0 * dRandReal() * dRandReal(), 0, 0);
+  }
+  w->def.model = HAP_MODEL_CONTACT;
+  w->def.physics_hz = 60.0;
+  expert_wish(&w->expert, HAP_EFFECT_RANGE, HAP_EFFECT_ON);
+  world_create_session(w, NULL);
+  world_add_pointer(w, 0.3, 0.5, 0.5, 0.5);
+  world_move_pointer(w, 0, AT(0.5, 0.5, 0.5), AT(SWARM_HAND, 0, 0));
+  session_run(w->session);
+  return w;
+}
+
+/* m, between the boxes of two bodies along the axis where it is largest. */
+static double swarm_gap(dBodyID a, dBodyID b)
+{
+  dReal of[2][6];
+  double gap = -HUGE_VAL;
+  dGeomGetAABB(dBodyGetFirstGeom(a), of[0]);
+  dGeomGetAABB(dBodyGetFirstGeom(b), of[1]);
+  for (int k = 0; k < 6; k += 2) {
+    gap = fmax(gap, fmax(of[0][k] - of[1][k + 1], of[1][k] - of[0][k + 1]));
+  }
+  return gap;
+}
+
+/* Whether the walk meets the other body from an owned one, which the hand may push. */
+static bool swarm_meets(const test_world *w, dBodyID owned, dBodyID other)
+{
+  const double seconds = 2.0 / 60.0;
+  double speed = fmax(dBodyGetLinearVel(owned)[0], SWARM_HAND) + dBodyGetLinearVel(other)[0];
+  double reach = 0.005 + 1.5 * speed * seconds + 0.5 * 9.81 * seconds * seconds;
+  return (world_slot(w, owned)->flags & HAPI_BODY_OWNED) != 0 && swarm_gap(owned, other) <= reach;
+}
+
+static int swarm_pairs(const test_world *w, dBodyID a, dBodyID b)
+{
+  hapi_near *near = world_physics(w)->near.range.near;
+  const hapi_near_geom *geoms = hapi_near_geoms(near);
+  uint32_t slots[2] = {(uint32_t)(world_slot(w, a) - world_physics(w)->near.slots.bodies),
+                       (uint32_t)(world_slot(w, b) - world_physics(w)->near.slots.bodies)};
+  int count = 0;
+  for (uint32_t i = 0; i < near->pair_count; ++i) {
+    const hapi_near_pair *pair = &hapi_near_pairs(near)[i];
+    uint32_t of[2] = {geoms[pair->geom_a].body, geoms[pair->geom_b].body};
+    count += (of[0] == slots[0] && of[1] == slots[1]) || (of[0] == slots[1] && of[1] == slots[0]);
+  }
+  return count;
+}
+
+/* Whichever of the two the walk comes to first. */
+TEST(a_pair_is_in_the_message_once_if_either_body_may_come_to_the_other)
+{
+  int pairs = 0;
+  int one_way = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    test_world *w = open_swarm(seed);
+    for (int i = 0; i < SWARM; ++i) {
+      for (int k = 0; k < i; ++k) {
+        bool there = swarm_meets(w, w->bodies[i], w->bodies[k]);
+        bool back = swarm_meets(w, w->bodies[k], w->bodies[i]);
+        CHECK(swarm_pairs(w, w->bodies[i], w->bodies[k]) == (there || back));
+        pairs += there || back;
+        one_way += there != back;
+      }
+    }
+  }
+  CHECK(pairs > SWARM && one_way > 3 && one_way < pairs);
+}
+
 /* A fast pointer must not pass through between two syncs: contact before it arrives. */
 TEST(a_fast_body_is_known_before_it_arrives)
 {

@@ -184,15 +184,14 @@ static bool island_add_links(hapi_nearby *nearby, uint32_t known, hapi_range_nee
     return false;
   }
   for (uint32_t i = 0; i < range->links.count; ++i) {
-    dBodyID body = hapi_geom_body(nearby->world, range->links.list[i].other);
-    bool has_end = body == NULL || dBodyIsKinematic(body);
+    const hapi_link *link = &range->links.list[i];
+    bool has_end = link->body == NULL || dBodyIsKinematic(link->body);
     ahead->half_pairs += has_end ? 2 : 1; /* others are met from both sides */
     if (has_end) {
       continue;
     }
-    uint32_t other = hapi_bodies_find(&nearby->world->bodies, body);
-    HAPI_ASSERT_INDEX(other, nearby->world->bodies.high); /* can_own has asked for it */
-    if (body_is_done(nearby, other) || !island_add_met(nearby, other)) {
+    HAPI_ASSERT_INDEX(link->known, nearby->world->bodies.high); /* can_own has asked for it */
+    if (body_is_done(nearby, link->known) || !island_add_met(nearby, link->known)) {
       return false;
     }
   }

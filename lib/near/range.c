@@ -143,21 +143,19 @@ static bool fill_geom(hapi_nearby *nearby, dGeomID geom, hapi_near_geom *out)
 static uint32_t take_geom(hapi_nearby *nearby, dGeomID geom)
 {
   hapi_range *range = &nearby->range;
-  for (uint32_t i = 0; i < range->near->geom_count; ++i) {
-    if (range->geoms[i] == geom) {
-      return i;
-    }
+  uint64_t address = hapi_index_address(geom);
+  uint32_t index = hapi_index_get(&range->geoms, address);
+  if (index != HAPI_INDEX_NONE) {
+    return index;
   }
-  if (range->near->geom_count == nearby->cycle->config->capacity.geoms) {
+  index = range->near->geom_count;
+  if (index == nearby->cycle->config->capacity.geoms ||
+      !hapi_index_reserve(&range->geoms, index + 1) ||
+      !fill_geom(nearby, geom, &hapi_near_geoms(range->near)[index])) {
     ++nearby->counts.dropped;
     return HAPI_NONE;
   }
-  uint32_t index = range->near->geom_count;
-  if (!fill_geom(nearby, geom, &hapi_near_geoms(range->near)[index])) {
-    ++nearby->counts.dropped;
-    return HAPI_NONE;
-  }
-  range->geoms[index] = geom;
+  hapi_index_put(&range->geoms, address, index);
   ++range->near->geom_count;
   return index;
 }
@@ -235,7 +233,6 @@ static uint32_t add_triangle(hapi_nearby *nearby, const hapi_near_triangle *tria
       out->extent = fmax(out->extent, hapi_v3_norm(corner));
     }
   }
-  range->geoms[near->geom_count] = NULL; /* not to be found by its geom */
   return near->geom_count++;
 }
 
@@ -376,7 +373,6 @@ static void add_meeting(hapi_nearby *nearby, const hapi_link *link, const link_p
 static void add_parts(hapi_nearby *nearby, const hapi_link *link)
 {
   link_parts parts;
-  dBodyID other = hapi_geom_body(nearby->world, link->other);
   parts_find(nearby, link, &parts);
   if (!parts.all || parts.pairs == 0) {
     return;
@@ -384,7 +380,7 @@ static void add_parts(hapi_nearby *nearby, const hapi_link *link)
   if (!parts.own_is_mesh) {
     uint32_t own = take_geom(nearby, link->own);
     for (uint32_t i = 0; i < parts.other; ++i) {
-      uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i], other);
+      uint32_t geom = add_triangle(nearby, &nearby->meshes.found[i], link->body);
       add_pair(nearby, link, own, geom, 0);
     }
     return;
@@ -399,7 +395,7 @@ static void add_parts(hapi_nearby *nearby, const hapi_link *link)
   }
   uint32_t first = nearby->range.near->geom_count;
   for (uint32_t i = 0; i < parts.other; ++i) {
-    if (add_triangle(nearby, &nearby->meshes.found[i], other) == HAPI_NONE) {
+    if (add_triangle(nearby, &nearby->meshes.found[i], link->body) == HAPI_NONE) {
       return;
     }
   }
@@ -515,36 +511,11 @@ static bool bits_meet(dGeomID a, dGeomID b)
          (dGeomGetCategoryBits(b) & dGeomGetCollideBits(a)) != 0;
 }
 
-/* A pair is met from both of its bodies. */
-static hapi_pair_place *pair_place(const hapi_range *range, uint64_t key, bool *out_found)
+static double surface_speed(const hapi_known_body *known)
 {
-  HAPI_ASSERT(2 * range->links.pairs_noted <=
-              range->links.pair_place_count); /* there is a free one */
-  uint32_t mask = range->links.pair_place_count - 1;
-  uint32_t at = (uint32_t)(key >> 32) & mask;
-  while (range->links.pair_places[at].walk == range->number &&
-         range->links.pair_places[at].key != key) {
-    at = (at + 1) & mask;
-  }
-  *out_found = range->links.pair_places[at].walk == range->number;
-  return &range->links.pair_places[at];
-}
-
-static uint64_t meeting_key(dGeomID own, dGeomID other)
-{
-  return pair_key(hapi_index_address(own), hapi_index_address(other), 0);
-}
-
-static double surface_speed(const hapi_nearby *nearby, dBodyID body)
-{
-  uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
-  if (known == HAPI_NONE) {
-    return 0.0;
-  }
-  const hapi_known_body *of = known_body(nearby, known);
   hap_twist twist;
-  hapi_extent_twist(of, &twist);
-  return hapi_v3_norm(twist.linear) + of->extent * hapi_v3_norm(twist.angular);
+  hapi_extent_twist(known, &twist);
+  return hapi_v3_norm(twist.linear) + known->extent * hapi_v3_norm(twist.angular);
 }
 
 /* How far two surfaces may come nearer until the model after the next. */
@@ -554,53 +525,70 @@ static double link_reach(const hapi_nearby *nearby, double speed)
   return LINK_FLOOR + 1.5 * speed * seconds + 0.5 * LINK_GRAVITY * seconds * seconds;
 }
 
-static bool boxes_come_near(const dReal a[6], dGeomID other, double reach)
+/* Largest gap along an axis; the same of (b, a), to the last bit. */
+static double boxes_gap(const dReal a[6], const dReal b[6])
 {
-  dReal b[6];
-  dGeomGetAABB(other, b);
+  double gap = -HUGE_VAL;
   for (int k = 0; k < 6; k += 2) {
-    if (a[k] - reach > b[k + 1] || b[k] - reach > a[k + 1]) {
-      return false;
-    }
+    double behind = a[k] - b[k + 1];
+    double before = b[k] - a[k + 1];
+    gap = behind > gap ? behind : gap;
+    gap = before > gap ? before : gap;
   }
-  return true;
+  return gap;
+}
+
+/* With the links of the other body, which this walk has taken. */
+static bool met_before(const hapi_nearby *nearby, uint32_t known, double gap, double other_speed)
+{
+  const hapi_range *range = &nearby->range;
+  if (known == HAPI_NONE || nearby->visits[known].ranged_in != range->number ||
+      (nearby->slots.bodies[known_body(nearby, known)->slot].flags & HAPI_BODY_OWNED) == 0) {
+    return false;
+  }
+  return gap <= link_reach(nearby, fmax(other_speed, range->fastest) + range->links.own_speed);
 }
 
 static void link_geom(void *data, dGeomID a, dGeomID b)
 {
   hapi_nearby *nearby = data;
   hapi_range *range = &nearby->range;
-  dGeomID geom = a == range->links.box_geom ? b : a;
+  hapi_links *links = &range->links;
+  dGeomID geom = a == links->box_geom ? b : a;
   if (dGeomIsSpace(geom)) {
-    dSpaceCollide2(range->links.box_geom, geom, data, link_geom);
+    dSpaceCollide2(links->box_geom, geom, data, link_geom);
     return;
   }
   dBodyID body = hapi_geom_body(nearby->world, geom);
-  double reach = link_reach(nearby, range->links.own_speed + surface_speed(nearby, body));
-  if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass || body == range->links.own_body ||
-      !bits_meet(range->links.own_geom, geom) ||
-      !boxes_come_near(range->links.own_box, geom, reach)) {
+  if (body == links->own_body || !dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass ||
+      !bits_meet(links->own_geom, geom)) {
     return;
   }
-  bool met_before = false;
-  (void)pair_place(range, meeting_key(range->links.own_geom, geom), &met_before);
-  if (met_before) {
+  dReal box[6];
+  dGeomGetAABB(geom, box);
+  uint32_t known = body != NULL ? hapi_bodies_find(&nearby->world->bodies, body) : HAPI_NONE;
+  double other_speed = known != HAPI_NONE ? surface_speed(known_body(nearby, known)) : 0.0;
+  double reach = link_reach(nearby, fmax(links->own_speed, range->fastest) + other_speed);
+  double gap = boxes_gap(links->own_box, box);
+  if (gap > reach || met_before(nearby, known, gap, other_speed)) {
     return;
   }
-  if (!hapi_reserve((void **)&range->links.list, &range->links.capacity, range->links.count, 1,
-                    sizeof *range->links.list)) {
+  if (!hapi_reserve((void **)&links->list, &links->capacity, links->count, 1,
+                    sizeof *links->list)) {
     ++nearby->counts.dropped;
-    range->links.missing = true;
+    links->missing = true;
     return;
   }
-  hapi_link *link = &range->links.list[range->links.count];
-  link->own = range->links.own_geom;
+  hapi_link *link = &links->list[links->count];
+  link->own = links->own_geom;
   link->other = geom;
+  link->body = body;
+  link->known = known;
   for (int k = 0; k < 6; ++k) {
-    link->box[k] = range->links.own_box[k] + (k % 2 == 0 ? -reach : reach);
+    link->box[k] = links->own_box[k] + (k % 2 == 0 ? -reach : reach);
   }
   if (hapi_world_surface(nearby->world, nearby->cycle, link)) {
-    ++range->links.count;
+    ++links->count;
   }
 }
 
@@ -608,9 +596,9 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
 void hapi_range_links(hapi_nearby *nearby, const hapi_known_body *known)
 {
   hapi_range *range = &nearby->range;
-  double own = surface_speed(nearby, known->body);
-  range->links.own_speed = own > range->fastest ? own : range->fastest;
-  double reach = link_reach(nearby, range->links.own_speed + nearby->neighbors.fastest);
+  range->links.own_speed = surface_speed(known);
+  double reach =
+      link_reach(nearby, fmax(range->links.own_speed, range->fastest) + nearby->neighbors.fastest);
   range->links.count = 0;
   range->links.missing = false;
   range->links.own_body = known->body;
@@ -644,10 +632,10 @@ static void need_geom(hapi_nearby *nearby, dGeomID geom, hapi_range_need *io)
   }
 }
 
-/* One that is not, for want of memory, is moved by ODE alone, and the loop cannot touch it. */
-static bool body_is_known(const hapi_nearby *nearby, dBodyID body)
+/* A body that is not, for want of memory, is moved by ODE alone, and the loop cannot touch it. */
+static bool link_is_known(const hapi_link *link)
 {
-  return body == NULL || hapi_bodies_find(&nearby->world->bodies, body) != HAPI_NONE;
+  return geom_is_known(link->other) && (link->body == NULL || link->known != HAPI_NONE);
 }
 
 /* Two meshes that bodies carry: only ODE's collider knows them. */
@@ -676,9 +664,8 @@ bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_
     }
   }
   for (uint32_t i = 0; i < range->links.count; ++i) {
-    dGeomID other = range->links.list[i].other;
-    if (!geom_is_known(other) || !body_is_known(nearby, hapi_geom_body(nearby->world, other)) ||
-        meshes_move(nearby, &range->links.list[i])) {
+    const hapi_link *link = &range->links.list[i];
+    if (!link_is_known(link) || meshes_move(nearby, link)) {
       return false;
     }
   }
@@ -717,23 +704,13 @@ static void take_links(hapi_nearby *nearby)
   hapi_range *range = &nearby->range;
   for (uint32_t i = 0; i < range->links.count; ++i) {
     const hapi_link *link = &range->links.list[i];
-    dBodyID body = hapi_geom_body(nearby->world, link->other);
-    uint64_t key = meeting_key(link->own, link->other);
-    bool found = false;
-    hapi_pair_place *place = pair_place(range, key, &found);
-    if (!found && 2 * range->links.pairs_noted < range->links.pair_place_count) {
-      place->key = key;
-      place->walk = range->number;
-      ++range->links.pairs_noted;
-    }
     range->bounces +=
         (link->surface.flags & HAPI_SURFACE_BOUNCE) != 0 && link->surface.bounce > 0.0;
-    uint32_t known = hapi_bodies_find(&nearby->world->bodies, body);
-    if (body != NULL && (known == HAPI_NONE || !range_enqueue(nearby, known))) {
+    if (link->body != NULL && (link->known == HAPI_NONE || !range_enqueue(nearby, link->known))) {
       continue;
     }
-    if (body != NULL) {
-      nearby->slots.bodies[known_body(nearby, known)->slot].linked = true;
+    if (link->body != NULL) {
+      nearby->slots.bodies[known_body(nearby, link->known)->slot].linked = true;
     }
     if (link_has_parts(link)) {
       add_parts(nearby, link);
@@ -865,13 +842,13 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
   range->near->geom_count = 0;
   range->near->pair_count = 0;
   range->near->point_count = 0;
+  hapi_index_clear(&range->geoms);
   range->near->tool_count = range->near->tool_pair_count = 0;
   range->number = nearby->cycle->model_number + 1;
   range->count = range->owned = range->seeds = range->bounces = 0;
   range->near->between = !hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_PASSES);
   range->near->contact_hz = nearby->cycle->settings.contact_hz;
   range->near->always = hapi_wish_is_on(nearby->cycle->wishes, HAP_EFFECT_PASSES);
-  range->links.pairs_noted = 0;
   range->refused = range->cut = false;
   range->hops = 0;
   range->mechanism.joint_count = range->mechanism.count = range->mechanism.moving = 0;
@@ -946,8 +923,6 @@ void hapi_range_publish(hapi_nearby *nearby)
 void hapi_range_reset(hapi_nearby *nearby)
 {
   hapi_range *range = &nearby->range;
-  memset(range->links.pair_places, 0,
-         range->links.pair_place_count * sizeof *range->links.pair_places);
   range->number = 0;
   hapi_geom_names_clear(&range->names);
 }
@@ -957,21 +932,13 @@ bool hapi_range_create(hapi_nearby *nearby)
   hapi_range *range = &nearby->range;
   const hapi_capacity *c = &nearby->cycle->config->capacity;
   range->queue = hapi_alloc_array(c->bodies, sizeof *range->queue);
-  range->geoms = hapi_alloc_array(c->geoms, sizeof(dGeomID));
   range->mechanism.members = hapi_alloc_array(c->bodies, sizeof *range->mechanism.members);
   range->mechanism.joints = hapi_alloc_array(c->joints, sizeof *range->mechanism.joints);
   range->ahead.island = hapi_alloc_array(c->bodies, sizeof *range->ahead.island);
-  range->links.pair_place_count = 4;
-  while (range->links.pair_place_count < 4 * c->pairs) {
-    range->links.pair_place_count *= 2;
-  }
-  range->links.pair_places =
-      hapi_alloc_array(range->links.pair_place_count, sizeof *range->links.pair_places);
   range->own_triangles = hapi_alloc_array(HAPI_NEAR_TRIANGLES, sizeof *range->own_triangles);
   range->links.box_geom = dCreateBox(NULL, 1.0, 1.0, 1.0);
-  return range->own_triangles != NULL && range->queue != NULL && range->geoms != NULL &&
-         range->mechanism.members != NULL && range->mechanism.joints != NULL &&
-         range->links.pair_places != NULL && range->ahead.island != NULL &&
+  return range->own_triangles != NULL && range->queue != NULL && range->mechanism.members != NULL &&
+         range->mechanism.joints != NULL && range->ahead.island != NULL &&
          range->links.box_geom != NULL && hapi_cover_create(&range->links.cover);
 }
 
@@ -983,14 +950,13 @@ void hapi_range_finish(hapi_nearby *nearby)
   }
   hapi_cover_finish(&range->links.cover);
   hapi_free(range->queue);
-  hapi_free(range->geoms);
+  hapi_index_finish(&range->geoms);
   hapi_free(range->own_triangles);
   hapi_free(range->links.list);
   hapi_free(range->ahead.island);
   hapi_free(range->ahead.comers);
   hapi_free(range->mechanism.members);
   hapi_free(range->mechanism.joints);
-  hapi_free(range->links.pair_places);
   hapi_geom_names_finish(&range->names);
   memset(range, 0, sizeof *range);
 }

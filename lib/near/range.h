@@ -11,6 +11,7 @@
 
 #include <ode/ode.h>
 
+#include "base/index.h"
 #include "near/cover.h"
 #include "near/geom_names.h"
 #include "sync/messages.h"
@@ -19,11 +20,6 @@
 #include "world/surfaces.h"
 
 typedef struct hapi_nearby hapi_nearby;
-
-typedef struct hapi_pair_place {
-  uint64_t key;
-  uint64_t walk; /* that noted it */
-} hapi_pair_place;
 
 /* What is near the geoms of one body. */
 typedef struct hapi_links {
@@ -36,10 +32,7 @@ typedef struct hapi_links {
   dBodyID own_body; /* the body, and the geom that is asked for, while ODE calls back */
   dGeomID own_geom;
   dReal own_box[6];
-  double own_speed;             /* m/s */
-  hapi_pair_place *pair_places; /* pairs of this walk: open addressing, a power of 2 */
-  uint32_t pair_place_count;
-  uint32_t pairs_noted;
+  double own_speed; /* m/s */
 } hapi_links;
 
 /* Bodies that joints tie together, and the joints of all mechanisms of the walk. */
@@ -78,7 +71,7 @@ typedef struct hapi_range {
   bool said_contacted; /* of contact joints of the application, once a session */
   bool said_meshes;    /* of two that move, likewise */
   struct hapi_near_triangle *own_triangles; /* of a mesh that moves; HAPI_NEAR_TRIANGLES */
-  dGeomID *geoms;                           /* of its geoms; capacity.geoms */
+  hapi_index geoms;                         /* of the message by address, but for triangles */
   uint64_t number;                          /* of the walk: that of its model */
   uint32_t *queue;                          /* entries of the body table; capacity.bodies */
   uint32_t count;

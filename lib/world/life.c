@@ -147,6 +147,7 @@ void hapi_world_finish(hapi_world *world)
   hapi_joints_finish(&world->joints);
   if (world->surfaces != NULL) {
     hapi_free(world->surfaces->entries);
+    hapi_free(world->surfaces->places);
   }
   if (world->notes != NULL) {
     hapi_free(world->notes->list);

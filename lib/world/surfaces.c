@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/assert.h"
+#include "base/index.h"
 #include "base/vec.h"
 #include "world/world.h"
 
@@ -16,40 +17,35 @@
 /* A softness from which on a contact is a spring, not a rigid one with rounding. */
 #define SOFT_CFM 1e-6
 
+#define FEWEST_PLACES 256u
+
+#define SURFACE_MOST 1e12
+
+static bool part_is_sound(const dSurfaceParameters *s, int bit, double value, double low,
+                          double high)
+{
+  return (s->mode & bit) == 0 || (value >= low && value <= high); /* not NaN */
+}
+
 /* What ODE reads of a surface must be numbers: one that is not ends in an abort of the process, and
  * so can a softness below 0, which divides by what is left of a row. */
 static bool surface_is_sound(const dSurfaceParameters *s)
 {
-  const double most = 1e12;
-  const struct {
-    int bit;
-    double value;
-    double low;
-    double high;
-  } parts[] = {
-      {0, s->mu, 0.0, HUGE_VAL}, /* ODE reads it whatever the mode is */
-      {dContactMu2, s->mu2, 0.0, HUGE_VAL},
-      {dContactRolling, s->rho, 0.0, HUGE_VAL},
-      {dContactRolling, s->rho2, 0.0, HUGE_VAL},
-      {dContactRolling, s->rhoN, 0.0, HUGE_VAL},
-      {dContactBounce, s->bounce, -most, most},
-      {dContactBounce, s->bounce_vel, -most, most},
-      {dContactSoftERP, s->soft_erp, -most, most},
-      {dContactSoftCFM, s->soft_cfm, 0.0, most},
-      {dContactMotion1, s->motion1, -most, most},
-      {dContactMotion2, s->motion2, -most, most},
-      {dContactMotionN, s->motionN, -most, most},
-      {dContactSlip1, s->slip1, 0.0, most},
-      {dContactSlip2, s->slip2, 0.0, most},
-  };
-  for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
-    bool read = parts[i].bit == 0 || (s->mode & parts[i].bit) != 0;
-    bool good = parts[i].value >= parts[i].low && parts[i].value <= parts[i].high; /* not NaN */
-    if (read && !good) {
-      return false;
-    }
-  }
-  return true;
+  const double most = SURFACE_MOST;
+  return s->mu >= 0.0 && /* ODE reads it whatever the mode is */
+         part_is_sound(s, dContactMu2, s->mu2, 0.0, HUGE_VAL) &&
+         part_is_sound(s, dContactRolling, s->rho, 0.0, HUGE_VAL) &&
+         part_is_sound(s, dContactRolling, s->rho2, 0.0, HUGE_VAL) &&
+         part_is_sound(s, dContactRolling, s->rhoN, 0.0, HUGE_VAL) &&
+         part_is_sound(s, dContactBounce, s->bounce, -most, most) &&
+         part_is_sound(s, dContactBounce, s->bounce_vel, -most, most) &&
+         part_is_sound(s, dContactSoftERP, s->soft_erp, -most, most) &&
+         part_is_sound(s, dContactSoftCFM, s->soft_cfm, 0.0, most) &&
+         part_is_sound(s, dContactMotion1, s->motion1, -most, most) &&
+         part_is_sound(s, dContactMotion2, s->motion2, -most, most) &&
+         part_is_sound(s, dContactMotionN, s->motionN, -most, most) &&
+         part_is_sound(s, dContactSlip1, s->slip1, 0.0, most) &&
+         part_is_sound(s, dContactSlip2, s->slip2, 0.0, most);
 }
 
 bool hapi_world_direction(const hapi_world *world, dGeomID a, dGeomID b, double out[3])
@@ -84,45 +80,56 @@ static bool ask_application(const hapi_world *world, const hapi_cycle *cycle, dG
 
 /* The application is asked once a step for each pair; model CONTACT asks for some of them twice, in
  * the collision phase and when it looks for what is near. */
-static hapi_surface_entry *cache_find(hapi_surface_cache *cache, dGeomID a, dGeomID b)
+static uint32_t pair_hash(dGeomID a, dGeomID b)
 {
-  HAPI_ASSERT(cache->used < cache->capacity); /* or the search has no end */
-  uint64_t x = (uint64_t)(uintptr_t)a;
-  uint64_t y = (uint64_t)(uintptr_t)b;
-  uint64_t key = (x < y ? x : y) * 0x9e3779b97f4a7c15u ^ (x < y ? y : x);
-  uint32_t at = (uint32_t)((key * 0xff51afd7ed558ccdu) >> 40) & (cache->capacity - 1);
-  for (;; at = (at + 1) & (cache->capacity - 1)) {
-    hapi_surface_entry *entry = &cache->entries[at];
-    bool same = (entry->a == a && entry->b == b) || (entry->a == b && entry->b == a);
-    if (entry->step != cache->step || same) {
-      return entry;
+  uint64_t x = hapi_index_address(a);
+  uint64_t y = hapi_index_address(b);
+  return (uint32_t)hapi_index_mix((x < y ? x : y) * 0x9e3779b97f4a7c15u ^ (x < y ? y : x));
+}
+
+/* The place of a pair, or the free one where it would be. */
+static hapi_surface_place *cache_place(const hapi_surface_cache *cache, uint32_t hash, dGeomID a,
+                                       dGeomID b)
+{
+  HAPI_ASSERT(cache->used < cache->place_count); /* or the search has no end */
+  for (uint32_t at = hash;; ++at) {
+    hapi_surface_place *place = &cache->places[at & (cache->place_count - 1)];
+    if (place->taken == 0) {
+      return place;
+    }
+    const hapi_surface_entry *entry = &cache->entries[place->taken - 1];
+    if (place->hash == hash &&
+        ((entry->a == a && entry->b == b) || (entry->a == b && entry->b == a))) {
+      return place;
     }
   }
 }
 
-/* Room for one more, at most half full; false without memory: the application is asked again. */
+/* Room for one more, places at most half taken; false without memory: the application is asked
+ * again. */
 static bool cache_reserve(hapi_surface_cache *cache)
 {
-  if (cache->entries != NULL && 2 * cache->used < cache->capacity) {
-    return true;
-  }
-  HAPI_ASSERT((cache->capacity & (cache->capacity - 1)) == 0);
-  hapi_surface_cache larger = {.capacity = cache->capacity > 0 ? 2 * cache->capacity : 256,
-                               .step = cache->step};
-  larger.entries = hapi_alloc_array(larger.capacity, sizeof *larger.entries);
-  if (larger.entries == NULL) {
+  if (!hapi_reserve((void **)&cache->entries, &cache->capacity, cache->used, 1,
+                    sizeof *cache->entries)) {
     return false;
   }
-  const hapi_surface_entry *old = cache->entries;
-  for (uint32_t i = 0; old != NULL && i < cache->capacity; ++i) {
-    const hapi_surface_entry *entry = &old[i];
-    if (entry->step == cache->step) {
-      *cache_find(&larger, entry->a, entry->b) = *entry;
-      ++larger.used;
-    }
+  if (2 * cache->used < cache->place_count) {
+    return true;
   }
-  hapi_free(cache->entries);
-  *cache = larger;
+  HAPI_ASSERT((cache->place_count & (cache->place_count - 1)) == 0);
+  uint32_t place_count = cache->place_count > 0 ? 2 * cache->place_count : FEWEST_PLACES;
+  hapi_surface_place *places = hapi_alloc_array(place_count, sizeof *places);
+  if (places == NULL) {
+    return false;
+  }
+  hapi_free(cache->places);
+  cache->places = places;
+  cache->place_count = place_count;
+  for (uint32_t i = 0; i < cache->used; ++i) {
+    uint32_t hash = pair_hash(cache->entries[i].a, cache->entries[i].b);
+    *cache_place(cache, hash, cache->entries[i].a, cache->entries[i].b) =
+        (hapi_surface_place){hash, i + 1};
+  }
   return true;
 }
 
@@ -134,11 +141,17 @@ bool hapi_world_ask_surface(const hapi_world *world, const hapi_cycle *cycle, dG
   if (cycle->model != HAP_MODEL_CONTACT || !cache_reserve(cache)) {
     return ask_application(world, cycle, a, b, out);
   }
-  hapi_surface_entry *entry = cache_find(cache, a, b);
-  if (entry->step != cache->step) {
-    *entry = (hapi_surface_entry){.a = a, .b = b, .step = cache->step};
+  uint32_t hash = pair_hash(a, b);
+  hapi_surface_place *place = cache_place(cache, hash, a, b);
+  bool is_new = place->taken == 0;
+  if (is_new) {
+    *place = (hapi_surface_place){hash, ++cache->used};
+  }
+  hapi_surface_entry *entry = &cache->entries[place->taken - 1];
+  if (is_new) {
+    entry->a = a;
+    entry->b = b;
     entry->collides = ask_application(world, cycle, a, b, &entry->surface);
-    ++cache->used;
   }
   *out = entry->surface;
   *out_turned = entry->a != a; /* directions of motion belong to the order that was asked for */
@@ -205,6 +218,9 @@ bool hapi_world_surface(const hapi_world *world, const hapi_cycle *cycle, hapi_l
 
 void hapi_world_forget_surfaces(hapi_world *world)
 {
-  ++world->surfaces->step;
-  world->surfaces->used = 0;
+  hapi_surface_cache *cache = world->surfaces;
+  cache->used = 0;
+  if (cache->place_count > 0) {
+    memset(cache->places, 0, cache->place_count * sizeof *cache->places);
+  }
 }

@@ -15,26 +15,35 @@
 
 typedef struct hapi_world hapi_world;
 
+/* What the application said of a pair. */
 typedef struct hapi_surface_entry {
   dGeomID a; /* compared only */
   dGeomID b;
-  uint64_t step; /* in which it was asked for */
   bool collides;
   dSurfaceParameters surface;
 } hapi_surface_entry;
 
+typedef struct hapi_surface_place {
+  uint32_t hash;  /* of the pair */
+  uint32_t taken; /* entry + 1; 0: free */
+} hapi_surface_place;
+
+/* Searches stay within the places: entries are larger, and thousands of them are new in each step. */
 typedef struct hapi_surface_cache {
-  hapi_surface_entry *entries; /* open addressing, a power of 2 */
+  hapi_surface_entry *entries; /* of this step, in the order of asking */
   uint32_t capacity;
   uint32_t used;
-  uint64_t step;
+  hapi_surface_place *places; /* open addressing, a power of 2 */
+  uint32_t place_count;
 } hapi_surface_cache;
 
 /* A geom and another one near it. */
 typedef struct hapi_link {
   dGeomID own;
   dGeomID other;
-  dReal box[6]; /* own's, with the reach */
+  dBodyID body;   /* of other, or its carrier; NULL: static */
+  uint32_t known; /* its entry of the body table; HAPI_NONE: static, or without memory */
+  dReal box[6];   /* own's, with the reach */
   hapi_surface surface;
   bool turned; /* the surface is of (other, own) */
 } hapi_link;
