@@ -18,6 +18,7 @@
 
 #define BLOCK 200
 #define BODIES_MAX 6
+#define SESSION_BODIES 16 /* with the default most of the time would go to clearing memory */
 #define TICKS 50
 #define BLOCK_SECONDS 120 /* a world that takes longer does not end */
 #define POINTS_MAX 8
@@ -211,6 +212,8 @@ static bool world_run(random_world *r)
   hap_pointer_def_init(&pointer, sizeof pointer);
   def.drive = HAP_DRIVE_LOCKSTEP;
   def.physics_hz = draw_chance(r, 0.5) ? 20.0 : 60.0;
+  def.max_bodies = SESSION_BODIES;
+  def.max_contacts = 12 * SESSION_BODIES;
   ode.world = r->world;
   ode.space = r->space;
   pointer.friction = draw_chance(r, 0.5) ? 0.5 : 0.0;
