@@ -54,6 +54,8 @@ static const program programs[] = {
     {"late", bench_late,
      "a loop that is stopped in pulses: force, steps, and what the guard does; --scene NAME"},
     {"line", bench_line, "a SPIDAR at 1 kHz through its emulator: ticks without a new answer"},
+    {"oscillation", bench_oscillation,
+     "a device that swings by itself or runs away: when the guard acts, and where it must not"},
     {"poses", bench_poses,
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},

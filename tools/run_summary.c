@@ -53,6 +53,8 @@ static const char *fault_name(hap_fault fault)
       return "emergency";
     case HAP_FAULT_LATE:
       return "late";
+    case HAP_FAULT_OSCILLATION:
+      return "oscillation";
     case HAP_FAULT_BLOCKED:
       return "blocked";
   }
@@ -87,6 +89,7 @@ static void print_more(const hap_stats *stats, FILE *out)
   count_print(out, "slewed_ticks", stats->faults.slewed_ticks);
   count_print(out, "energy_ticks", stats->faults.energy_ticks);
   count_print(out, "derated_ticks", stats->safety.derated_ticks);
+  count_print(out, "oscillation_ticks", stats->safety.oscillation_ticks);
   count_print(out, "unsolved_ticks", stats->room.unsolved_ticks);
   count_print(out, "range_most", stats->room.range_most);
   count_print(out, "range_cut", stats->room.range_cut);

@@ -157,14 +157,15 @@ typedef enum hap_coupling_reason {
 
 /* What the guard did to a pointer's force. Bits; values are never renumbered. */
 typedef enum hap_guard_flag {
-  HAP_GUARD_STALE = 1,      /* less force: the local model is older than two physics steps */
-  HAP_GUARD_RAMP_IN = 2,    /* less force: the first 20 ms after a start or a reset */
-  HAP_GUARD_ENERGY = 4,     /* the energy observer held force back */
-  HAP_GUARD_SLEW = 8,       /* the slew limit held force back */
-  HAP_GUARD_SATURATED = 16, /* beyond a limit and shortened, direction kept */
-  HAP_GUARD_FAULT = 32,     /* a fault is latched: on the way to zero, or there */
-  HAP_GUARD_LATE = 64,      /* less force: ticks of the loop came late */
-  HAP_GUARD_INPUT = 256     /* the device is not believed: carried on, then less and less force */
+  HAP_GUARD_STALE = 1,         /* less force: the local model is older than two physics steps */
+  HAP_GUARD_RAMP_IN = 2,       /* less force: the first 20 ms after a start or a reset */
+  HAP_GUARD_ENERGY = 4,        /* the energy observer held force back */
+  HAP_GUARD_SLEW = 8,          /* the slew limit held force back */
+  HAP_GUARD_SATURATED = 16,    /* beyond a limit and shortened, direction kept */
+  HAP_GUARD_FAULT = 32,        /* a fault is latched: on the way to zero, or there */
+  HAP_GUARD_LATE = 64,         /* less force: ticks of the loop came late */
+  HAP_GUARD_OSCILLATION = 128, /* less force: the device swings by itself, or seems to run away */
+  HAP_GUARD_INPUT = 256 /* the device is not believed: carried on, then less and less force */
 } hap_guard_flag;
 
 /* A pointer in its last tick. It has a size and may grow at its end. */

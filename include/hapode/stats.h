@@ -25,6 +25,7 @@ typedef enum hap_fault {
   HAP_FAULT_WORLD = 6,        /* the ODE world holds a body that cannot be stepped */
   HAP_FAULT_EMERGENCY = 7,    /* hap_emergency_zero was called */
   HAP_FAULT_LATE = 8,         /* ticks came too late, or too many were missed, under force */
+  HAP_FAULT_OSCILLATION = 9,  /* the device swings by itself, or runs away from a surface */
   HAP_FAULT_BLOCKED = 10,     /* the loop stood still, in a call of a device or elsewhere */
   /* for 18 ms the device told positions that no hand moves to, or said that they are wrong */
   HAP_FAULT_DEVICE_INPUT = 11
@@ -185,7 +186,8 @@ typedef struct hap_error_stats {
 /* What the guard did because the loop or the device could not be trusted. A tick counts once,
  * whatever the number of pointers. */
 typedef struct hap_safety_stats {
-  uint64_t derated_ticks; /* ticks in which late ticks had lowered a force (docs/safety.md) */
+  uint64_t derated_ticks;     /* ticks in which late ticks had lowered a force (docs/safety.md) */
+  uint64_t oscillation_ticks; /* the same because a device swung by itself, or seemed to run away */
 } hap_safety_stats;
 
 /* Model CONTACT: what a tick has time for. In drive LOCKSTEP and in a replay no time of this

@@ -70,6 +70,31 @@
 #define HAPI_SAFETY_DEBT_AFTER_S 0.3     /* s */
 #define HAPI_SAFETY_DEBT_S 0.3           /* s */
 
+/* ---- a device that swings by itself, or runs away ---- */
+#define HAPI_SAFETY_SWING_LARGE 0.2      /* 1 */
+#define HAPI_SAFETY_SWING_LEAST_HZ 3.5   /* Hz */
+#define HAPI_SAFETY_SWING_HZ 9.0         /* Hz */
+#define HAPI_SAFETY_SWING_ALIKE 0.7      /* 1 */
+#define HAPI_SAFETY_SWING_KEPT 0.95      /* 1 */
+#define HAPI_SAFETY_SWING_OWN 0.96       /* 1 */
+#define HAPI_SAFETY_SWING_STIFFER 1.2    /* 1 */
+#define HAPI_SAFETY_SWING_FED 0.15       /* 1 */
+#define HAPI_SAFETY_SWING_FAST_S 0.008   /* s */
+#define HAPI_SAFETY_SWING_LATE 0.1       /* 1 */
+#define HAPI_SAFETY_SWING_LEAST 0.1      /* 1 */
+#define HAPI_SAFETY_SWING_DOWN_S 0.02    /* s */
+#define HAPI_SAFETY_SWING_HOLD_S 0.5     /* s */
+#define HAPI_SAFETY_SWING_BACK_S 1.0     /* s */
+#define HAPI_SAFETY_SWING_HALVES 6.0     /* 1 */
+#define HAPI_SAFETY_SWING_FORGET 0.2     /* 1/s */
+#define HAPI_SAFETY_RUNAWAY_BEGIN 0.08   /* 1 */
+#define HAPI_SAFETY_RUNAWAY_FULL 0.24    /* 1 */
+#define HAPI_SAFETY_RUNAWAY_KEPT 0.75    /* 1 */
+#define HAPI_SAFETY_RUNAWAY_MASS 1.0     /* kg */
+#define HAPI_SAFETY_RUNAWAY_DOWN_S 0.005 /* s */
+#define HAPI_SAFETY_RUNAWAY_ASK_S 0.006  /* s */
+#define HAPI_SAFETY_RUNAWAY_LEFT 0.4     /* 1 */
+
 /* ---- a loop that stands still ---- */
 #define HAPI_SAFETY_LOOK_S 0.005      /* s */
 #define HAPI_SAFETY_BLOCKED_S 0.035   /* s */

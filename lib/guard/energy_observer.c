@@ -152,7 +152,7 @@ static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *p
     if (!(force2 > 0.0)) {
       continue;
     }
-    double felt = p->guard.felt * (1.0 - p->guard.late_loss);
+    double felt = p->guard.felt * (1.0 - p->guard.late_loss) * (1.0 - p->guard.swings.taken);
     *io_stored += p->rigid ? 0.0 : half_compliance(p) * force2 / c->weight;
     if (body != NULL && (body->flags & HAPI_BODY_OWNED) == 0) {
       sum -= work_on(facts->period, body, c);

@@ -43,6 +43,7 @@ void hapi_guard_reset_fault(hapi_guard *guard, const hapi_pointers *pointers,
   for (uint32_t i = 0; i < pointers->high; ++i) {
     pointers->of[i].guard.share = 0.0;
     hapi_input_forgive(&pointers->of[i]);
+    memset(&pointers->of[i].guard.swings, 0, sizeof pointers->of[i].guard.swings);
     pointers->of[i].device.jump_s = 0.0; /* whoever resets knows where the device is */
   }
   hapi_touches_forget(touches, HAPI_SLOT_NONE); /* the hand may be anywhere by now */
@@ -61,7 +62,7 @@ static bool vector_is_usable(const double v[3])
 
 /* A sum of squares within the limit says so of each; only what is far out is looked at one by
  * one. */
-static inline bool wrench_is_usable(const hap_wrench *w)
+bool hapi_guard_usable(const hap_wrench *w)
 {
   return hapi_v3_dot(w->force, w->force) + hapi_v3_dot(w->torque, w->torque) <=
              HAPI_SAFETY_WRENCH_LIMIT * HAPI_SAFETY_WRENCH_LIMIT ||
@@ -106,11 +107,13 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
   }
   bool waits = g->share <= 0.0 && p->belief.doubted;
   g->share = waits ? 0.0 : hapi_min(g->share + period / HAPI_SAFETY_RAMP_IN_S, 1.0);
-  double share = g->share * (1.0 - guard->age_loss) * (1.0 - p->belief.loss) * (1.0 - g->late_loss);
+  double share = g->share * (1.0 - guard->age_loss) * (1.0 - p->belief.loss) *
+                 (1.0 - g->late_loss) * (1.0 - g->swings.taken);
   g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;
   g->flags |= guard->age_loss > 0.0 ? HAP_GUARD_STALE : 0;
   g->flags |= p->belief.doubted || p->belief.loss > 0.0 ? HAP_GUARD_INPUT : 0;
   g->flags |= g->late_loss > 0.0 ? HAP_GUARD_LATE : 0;
+  g->flags |= g->swings.taken > 0.0 ? HAP_GUARD_OSCILLATION : 0;
   hapi_v3_scale(share, p->device.wrench.force, p->device.wrench.force);
   hapi_v3_scale(share, p->device.wrench.torque, p->device.wrench.torque);
 }
@@ -208,7 +211,7 @@ void hapi_guard_begin(hapi_guard *guard, const hapi_tick_facts *facts,
 {
   for (uint32_t i = 0; i < pointers->high; ++i) {
     const hapi_pointer *p = &pointers->of[i];
-    if (p->generation != 0 && !wrench_is_usable(&p->wrench)) {
+    if (p->generation != 0 && !hapi_guard_usable(&p->wrench)) {
       hapi_fault_set(&guard->latch, HAP_FAULT_FORCE, i + 1, p->generation);
     }
     if (p->generation != 0 && p->belief.loss >= 1.0) {
@@ -246,7 +249,7 @@ void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *poi
     bool torque_cut = vector_saturate(p->device.wrench.torque, p->device.limits.max_torque);
     p->guard.flags |= force_cut || torque_cut ? HAP_GUARD_SATURATED : 0;
     /* Whatever came in, and whatever went wrong here: NaN does not get to the motors. */
-    if (!wrench_is_usable(&p->device.wrench)) {
+    if (!hapi_guard_usable(&p->device.wrench)) {
       hapi_fault_set(&guard->latch, HAP_FAULT_FORCE, i + 1, p->generation);
       p->guard.flags = HAP_GUARD_FAULT;
       memset(&p->device.wrench, 0, sizeof p->device.wrench);

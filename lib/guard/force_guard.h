@@ -16,6 +16,9 @@ void hapi_guard_reset_fault(hapi_guard *guard, const hapi_pointers *pointers,
 /* The device has zero force at once, whatever the slew limit says. With a fault it stays so. */
 void hapi_guard_cut(hapi_pointer *pointer);
 
+/* Finite, and far from where squares overflow. */
+bool hapi_guard_usable(const hap_wrench *wrench);
+
 /* World wrench -> what the device shall get before the limits: finite, age of the local model,
  * ramp-in. */
 void hapi_guard_begin(hapi_guard *guard, const hapi_tick_facts *facts,

@@ -46,6 +46,7 @@ typedef struct hapi_guard {
   uint64_t stale_ticks;
   uint64_t slewed_ticks;
   uint64_t energy_ticks;
+  uint64_t oscillation_ticks;
   uint64_t saturated_ticks;
   double peak_force; /* N */
   double balance;    /* J, world units: what the hands and the world have put in and not got back */

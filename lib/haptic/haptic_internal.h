@@ -91,6 +91,7 @@ typedef struct hapi_hand_figures {
   _Atomic uint64_t slewed_ticks;
   _Atomic uint64_t energy_ticks;
   _Atomic uint64_t derated_ticks;
+  _Atomic uint64_t oscillation_ticks;
   _Atomic double peak_force;
   _Atomic double impulse[3];
   _Atomic double impulse_abs;

@@ -96,6 +96,7 @@ static void figures_publish(hapi_haptic *haptic)
   STORE(hand.slewed_ticks, tick->guard.slewed_ticks);
   STORE(hand.energy_ticks, tick->guard.energy_ticks);
   STORE(hand.derated_ticks, tick->guard.late.derated_ticks);
+  STORE(hand.oscillation_ticks, tick->guard.oscillation_ticks);
   STORE(loop.model, (int)tick->facts.model);
   STORE(loop.hash, tick->hashing && tick->facts.tick > 0 ? tick->hash : 0);
   STORE(loop.age_ns, age);
@@ -140,6 +141,7 @@ static void state_report(hapi_haptic *haptic)
   hapi_tick_report_work(&haptic->tick, &haptic->time.work);
   state->work = haptic->time.work;
   state->derated = haptic->tick.guard.late.derated_ticks > 0;
+  state->swings = haptic->tick.guard.oscillation_ticks > 0;
   state->unsolved = haptic->tick.rows.unsolved_most;
   hapi_exchange_state_publish(haptic->config.exchange);
 }
@@ -445,6 +447,7 @@ void hapi_haptic_stats(const hapi_haptic *haptic, hap_stats *out)
   out->faults.slewed_ticks = LOAD(hand.slewed_ticks);
   out->faults.energy_ticks = LOAD(hand.energy_ticks);
   out->safety.derated_ticks = LOAD(hand.derated_ticks);
+  out->safety.oscillation_ticks = LOAD(hand.oscillation_ticks);
   out->events.dropped = atomic_load(&haptic->told.telling.events.dropped);
   out->loop.realtime = atomic_load(&haptic->thread.realtime) ? 1 : 0;
   out->loop.trace_dropped = LOAD(loop.trace_dropped);

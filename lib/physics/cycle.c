@@ -276,6 +276,11 @@ static void cycle_tell(hapi_physics *physics, double seconds)
                   "ticks of the haptic loop come late: the force is lowered meanwhile "
                   "(hap_stats.safety.derated_ticks); real time or less to do would help");
   }
+  if (cycle->state != NULL && cycle->state->swings) {
+    hapi_say_once(cycle, &physics->said.swings,
+                  "a device swings by itself: the force is lowered meanwhile "
+                  "(hap_stats.safety.oscillation_ticks); less stiffness would help");
+  }
 }
 
 static void note_times(hapi_physics *physics, const double seconds[5], double looked_s)

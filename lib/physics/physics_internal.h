@@ -47,6 +47,7 @@ typedef struct hapi_said {
   bool late;
   bool unsolved;
   bool derated;
+  bool swings;
   bool cut;
 } hapi_said;
 

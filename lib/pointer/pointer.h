@@ -13,6 +13,7 @@
 #include <hapode/pointer.h>
 #include <hapode/spatial.h>
 
+#include "pointer/swings.h"
 #include "pointer/velocity.h"
 #include "sync/messages.h"
 
@@ -167,6 +168,7 @@ typedef struct hapi_guard_pointer {
   double felt;        /* 0..1, share after ramp-in and age */
   double force2;      /* N^2, of this tick: sum over the contacts, other models than CONTACT */
   double power;       /* W, likewise: of the bodies on the springs */
+  hapi_swings swings;
 } hapi_guard_pointer;
 
 typedef struct hapi_pointer {

@@ -8,6 +8,7 @@
 #include "base/vec.h"
 #include "guard/energy_observer.h"
 #include "guard/force_guard.h"
+#include "guard/oscillation.h"
 #include "paper/local_dynamics.h"
 #include "paper/render.h"
 #include "pointer/coupling.h"
@@ -140,6 +141,8 @@ static __attribute__((noinline)) void paper_step(hapi_tick *tick)
 
 void hapi_tick_guard(hapi_tick *tick)
 {
+  hapi_oscillation_follow(&tick->guard, &tick->facts, &tick->pointers, &tick->bodies,
+                          &tick->touches);
   hapi_guard_begin(&tick->guard, &tick->facts, &tick->pointers);
   if (tick->facts.observes && tick->guard.mode == HAP_GUARD_ON) {
     uint64_t begin = hapi_effect_begin(&tick->sample);
