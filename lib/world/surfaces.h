@@ -28,7 +28,8 @@ typedef struct hapi_surface_place {
   uint32_t taken; /* entry + 1; 0: free */
 } hapi_surface_place;
 
-/* Searches stay within the places: entries are larger, and thousands of them are new in each step. */
+/* Searches stay within the places: entries are larger, and thousands of them are new in each
+ * step. */
 typedef struct hapi_surface_cache {
   hapi_surface_entry *entries; /* of this step, in the order of asking */
   uint32_t capacity;
