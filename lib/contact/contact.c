@@ -11,6 +11,7 @@
 #include "base/histogram.h"
 #include "base/thread.h"
 #include "base/vec.h"
+#include "contact/flat_areas.h"
 #include "sync/mesh_filter.h"
 #include "sync/tool_seams.h"
 #include "sync/tool_side.h"
@@ -54,16 +55,10 @@ typedef struct tool_memory {
   uint32_t count;
 } tool_memory;
 
-#define GROUP_POINTS 512u
-#define SAME_PLACE 1e-7 /* m */
-#define SAME_COSINE 0.9999
-
 /* Points of the pairs of one key. */
 typedef struct pair_group {
-  uint32_t count;
-  double places[GROUP_POINTS][3];
-  double normals[GROUP_POINTS][3];
-  hapi_patch_contact contacts[GROUP_POINTS];
+  hapi_flat_areas flat;
+  hapi_patch_contact contacts[HAPI_FLAT_POINTS];
 } pair_group;
 
 struct hapi_contact {
@@ -262,34 +257,23 @@ static void fill_pair(const placed_pair *found, const hapi_near_pair *pair, hapi
   patches_add_pair(pair, out);
 }
 
-/* Neighbours in a mesh share their corners and edges, and each of them finds the point there. */
-static bool group_has(const pair_group *group, const hapi_patch_point *point)
-{
-  for (uint32_t i = 0; i < group->count; ++i) {
-    double apart[3];
-    hapi_v3_sub(point->core_a, group->places[i], apart);
-    if (hapi_v3_dot(apart, apart) < SAME_PLACE * SAME_PLACE &&
-        hapi_v3_dot(point->normal, group->normals[i]) > SAME_COSINE) {
-      return true;
-    }
-  }
-  return false;
-}
-
-/* False: there is no room for all points. */
+/* Neighbours in a mesh share their corners and edges, and each of them finds the point there.
+ * False: there is no room for all points. */
 static bool group_add(pair_group *group, const placed_pair *found, const hapi_near_pair *pair)
 {
+  uint32_t first = HAPI_SLOT_NONE;
   for (int i = 0; i < found->patch.count; ++i) {
     const hapi_patch_point *point = &found->patch.points[i];
-    if (group_has(group, point)) {
-      continue;
-    }
-    if (group->count == GROUP_POINTS) {
+    uint32_t at = hapi_flat_find(&group->flat, point->core_a, point->normal);
+    if (at == HAPI_FLAT_POINTS) {
       return false;
     }
-    hapi_v3_copy(point->core_a, group->places[group->count]);
-    hapi_v3_copy(point->normal, group->normals[group->count]);
-    pair_contact(found, pair, i, &group->contacts[group->count++]);
+    if (at == group->flat.count) {
+      (void)hapi_flat_add(&group->flat, point->core_a, point->normal, point->gap);
+      pair_contact(found, pair, i, &group->contacts[at]);
+    }
+    first = first == HAPI_SLOT_NONE ? at : first;
+    hapi_flat_join(&group->flat, first, at);
   }
   return true;
 }
@@ -304,7 +288,7 @@ static uint32_t fill_group(hapi_contact *contact, uint32_t first, uint64_t *io_w
   pass_pair *pass = &contact->pairs[first];
   uint32_t end = first;
   bool all = true;
-  group->count = 0;
+  group->flat.count = 0;
   pass->spare = HUGE_VAL;
   for (; end < contact->near->pair_count && pairs[end].key == pairs[first].key; ++end) {
     placed_pair found;
@@ -315,13 +299,15 @@ static uint32_t fill_group(hapi_contact *contact, uint32_t first, uint64_t *io_w
     }
   }
   atomic_fetch_add_explicit(&contact->left_out, !all, memory_order_relaxed);
-  pass->count = group->count;
+  pass->count = hapi_flat_reduce(&group->flat);
   *io_wanted += pass->count;
   if (pass->count > 0 && *io_wanted <= contact->config.capacity.contacts) {
-    for (uint32_t i = 0; i < pass->count; ++i) {
-      hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
-      *c = group->contacts[i];
-      c->surface = out->surface_count;
+    for (uint32_t i = 0; i < group->flat.count; ++i) {
+      if (!group->flat.points[i].spare) {
+        hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
+        *c = group->contacts[i];
+        c->surface = out->surface_count;
+      }
     }
     patches_add_pair(&pairs[first], out);
   }
