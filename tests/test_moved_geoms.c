@@ -497,6 +497,140 @@ TEST(a_moving_geom_may_be_given_a_body)
   }
 }
 
+static void way_rest(double time, thing_place *out)
+{
+  (void)time, (void)out;
+}
+
+/* It goes on under the hand: what was the static world's leaves as the body comes in. */
+TEST(a_geom_that_stands_may_be_given_a_body)
+{
+  for (int hull = 0; hull < 2; ++hull) {
+    moved_case c = {.hz = 60.0, .model = HAP_MODEL_CONTACT, .way = way_rest, .hull = hull != 0};
+    moved *m = moved_open(&c);
+    cw_start(&m->w, 0.0, 0.0, RADIUS - 0.002);
+    cw_run(&m->w, 150);
+    CHECK_NEAR(m->w.force[2], 2.0, 1e-9);
+    m->body = dBodyCreate(m->w.world);
+    dBodySetKinematic(m->body);
+    moved_put(m, 0.0);
+    dGeomSetBody(m->geom, m->body);
+    for (int k = 0; k < 100; ++k) {
+      cw_tick(&m->w);
+      CHECK(m->w.force[2] > 1.65 && m->w.force[2] < 2.001);
+    }
+    CHECK_NEAR(m->w.force[2], 2.0, 1e-9);
+  }
+}
+
+/* ---- slow motion, another start, geoms in a transform ---- */
+
+/* What the application does with time: slower, a pause, faster, as it was. */
+static double scale_at(int tick)
+{
+  return tick < 400 ? 0.3 : tick < 700 ? 0.1 : tick < 900 ? 0.0 : tick < 1200 ? 0.8 : 1.0;
+}
+
+static void slow_feel(const moved_case *c, felt *out)
+{
+  moved *m = moved_open(c);
+  double time = 0.0;
+  cw_start(&m->w, 0.02, 0.01, RADIUS - 0.003);
+  for (int k = 0; k < TICKS; ++k) {
+    thing_place there = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    CHECK(hap_session_set_time_scale(m->w.session, scale_at(k)) == HAP_OK);
+    c->way(time, &there);
+    time += 1e-3 * scale_at(k);
+    m->w.hand_at[2] = there.position[2] + RADIUS - 0.003;
+    cw_put_hand(&m->w, 0.0, 0.0, 0.0);
+    CHECK(hap_session_advance(m->w.session, 1) == HAP_OK);
+    cw_read(&m->w);
+    memcpy(out->force[k], m->w.force, sizeof m->w.force);
+  }
+}
+
+TEST(in_slow_motion_a_geom_is_felt_as_a_body_is)
+{
+  static const way_fn ways[] = {way_up, way_swing, way_along};
+  for (int i = 0; i < 12; ++i) {
+    static felt runs[2];
+    moved_case c = {.kind = i < 6 ? THING_BOX : THING_MESH,
+                    .hz = i % 4 < 2 ? 60.0 : 20.0,
+                    .model = HAP_MODEL_CONTACT,
+                    .way = ways[i % 3],
+                    .hull = i % 2 != 0,
+                    .friction = 0.5};
+    for (int body = 0; body < 2; ++body) {
+      c.has_body = body != 0;
+      slow_feel(&c, &runs[body]);
+    }
+    double apart = felt_apart(&runs[0], &runs[1], 0);
+    CHECK_SAY(apart < tolerance_of(c.kind, c.hull), "%d: %g N", i, apart);
+    CHECK(felt_most(&runs[1]) > 2.0);
+    CHECK_NEAR(runs[0].force[899][2], runs[0].force[750][2], 1e-6); /* a pause */
+  }
+}
+
+/* What it did before is forgotten. It may have been moved meanwhile. */
+TEST(after_another_start_a_geom_is_felt_as_a_body_is)
+{
+  for (int hull = 0; hull < 2; ++hull) {
+    static felt runs[2];
+    for (int body = 0; body < 2; ++body) {
+      moved_case c = {.hz = 60.0,
+                      .model = HAP_MODEL_CONTACT,
+                      .way = way_up,
+                      .has_body = body != 0,
+                      .hull = hull != 0};
+      moved *m = moved_open(&c);
+      cw_start(&m->w, 0.02, 0.01, RADIUS - 0.003);
+      for (int k = 0; k < TICKS; ++k) {
+        if (k == 500 || k == 1000) {
+          REQUIRE(hap_session_stop(m->w.session) >= HAP_OK);
+          m->time = 1e-3 * k + (k == 500 ? 0.0 : 0.2);
+          moved_put(m, m->time);
+          session_run(m->w.session);
+        }
+        m->w.hand_at[2] = SPEED * (1e-3 * k + (k < 1000 ? 0.0 : 0.2)) + RADIUS - 0.003;
+        cw_put_hand(&m->w, 0.0, 0.0, 0.0);
+        CHECK(hap_session_advance(m->w.session, 1) == HAP_OK);
+        cw_read(&m->w);
+        memcpy(runs[body].force[k], m->w.force, sizeof m->w.force);
+        bool learns = k % 500 < 120;
+        CHECK(learns || fabs(m->w.force[2] - 3.0) < 0.05);
+      }
+    }
+    double apart = felt_apart(&runs[0], &runs[1], 0);
+    printf("# %s: %g N apart\n", hull ? "hull" : "ball", apart);
+    CHECK(apart < 1.1); /* a body is not known to have stood before it was seen */
+  }
+}
+
+/* Moved as a whole. A hull does not feel what is in a transform, and that is said once. */
+TEST(a_geom_in_a_transform_is_followed)
+{
+  moved_case c = {.hz = 60.0, .model = HAP_MODEL_CONTACT, .way = way_up_later};
+  moved *m = moved_open(&c);
+  dGeomDestroy(m->geom);
+  dGeomID box = dCreateBox(NULL, 0.2, 0.2, THICK);
+  dGeomSetPosition(box, 0.0, 0.0, -0.03);
+  m->geom = dCreateGeomTransform(m->w.space);
+  dGeomTransformSetGeom(m->geom, box);
+  dGeomTransformSetInfo(m->geom, 1);
+  dGeomTransformSetCleanup(m->geom, 1);
+  m->middle[2] = 0.03 - 0.5 * THICK;
+  moved_put(m, 0.0);
+  cw_start(&m->w, 0.02, 0.01, RADIUS - 0.003);
+  for (int k = 0; k < TICKS; ++k) {
+    thing_place there = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    c.way(1e-3 * k, &there);
+    m->w.hand_at[2] = there.position[2] + RADIUS - 0.003;
+    cw_tick(&m->w);
+    bool begins = k < 30 || (k > 500 && k < 560);
+    CHECK(begins || fabs(m->w.force[2] - 3.0) < 0.02);
+  }
+}
+
 /* More of them than the loop has places for: told, and nothing else happens. */
 TEST(too_many_moving_geoms_are_told)
 {

@@ -152,17 +152,21 @@ static void tool_weigh(const hapi_tool_world *w, hapi_local_contact *contacts, u
 {
   const hapi_local_tool *tool = &w->tools[index];
   double sum = 0.0;
-  double members = 0.0;
+  double there = 0.0;
+  double leaving = 0.0;
   hapi_tool_walk at = hapi_tool_walk_begin(w, tool->pair);
   for (; at.tool != HAPI_SLOT_NONE; hapi_tool_walk_next(w, &at)) {
     uint32_t k = at.tool;
     if (w->tools[k].placed) {
       double like = k == index ? 1.0 : normal_likeness(&contacts[k], &contacts[index]);
+      double member = w->tools[k].member * like;
       sum += w->tools[k].claim * like;
-      members += w->tools[k].member * like;
+      there += w->tools[k].leaving ? 0.0 : member;
+      leaving = w->tools[k].leaving ? fmax(leaving, member) : leaving;
     }
   }
-  double all = fmin(members, 1.0); /* less: the last ones are leaving */
+  /* Less than 1: the last ones are leaving, all at the rate at which one comes in. */
+  double all = fmin(there + leaving, 1.0);
   contacts[index].weight = sum > 0.0 ? all * tool->claim / sum : 0.0;
 }
 

@@ -154,6 +154,7 @@ static void physics_prepare(hapi_physics *physics)
   hapi_nearby_reset(&physics->near);
   for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
     physics->world.bodies.entries[i].loop_owned = false;
+    physics->world.bodies.entries[i].posed = false; /* where it was put meanwhile it stands */
   }
   hapi_lookback_reset(&physics->lookback);
   hapi_dial_reset(&physics->dial,
