@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "bench/late.h"
+#include "device/device.h"
+#include "plugins/virtual/virtual.h"
 #include "session/session_internal.h"
 #include "tools/rig.h"
 
@@ -57,6 +59,7 @@ static hap_status late_ticks(bench *b, const rig *r, const late_def *def, late_r
   late_felt felt = {{0.0}, 0.0, 0.0, 0};
   hap_stats stats = {0};
   uint64_t derated = 0;
+  double least = 0.0;
   for (int t = 0; t < def->ticks; ++t) {
     bool pulsed = t >= def->begin && t < def->end;
     r->session->run_ticks = def->run_ticks;
@@ -65,6 +68,10 @@ static hap_status late_ticks(bench *b, const rig *r, const late_def *def, late_r
     if (status < HAP_OK) {
       return status;
     }
+    hapi_virtual_port port;
+    hapi_virtual_get_port(hapi_device_self(r->devices[0]), &port);
+    least = fmin(least, port.work);
+    out->gave = fmax(out->gave, port.work - least);
     (void)hap_session_stats(r->session, &stats, sizeof stats);
     if (t >= def->end && stats.safety.derated_ticks > derated) {
       out->back_ms = t + 1 - def->end;
@@ -131,16 +138,19 @@ static hap_status late_row(bench *b, FILE *csv, late_def def, const late_result 
   bench_check(
       b, told && back && ratio <= LATE_PEAK_RATIO && now.steps <= LATE_PEAK_RATIO * still->steps,
       "%s %u/%u ms from %d ms: %.2f N, %.2f of that without pulses; %u steps above 2 N "
-      "(%u without), largest %.2f N; %llu ticks with less force%s, back after %d ms",
+      "(%u without), largest %.2f N; %llu ticks with less force%s, back after %d ms; gave %.1f mJ "
+      "(%.1f)",
       def.scene, def.stop_ticks, def.run_ticks, def.begin, now.peak, ratio, now.steps, still->steps,
       now.step, (unsigned long long)now.derated,
-      now.fault == HAP_FAULT_NONE ? "" : ", then a fault", now.back_ms);
+      now.fault == HAP_FAULT_NONE ? "" : ", then a fault", now.back_ms, 1e3 * now.gave,
+      1e3 * still->gave);
   return HAP_OK;
 }
 
 static hap_status late_scene(bench *b, FILE *csv, const char *name)
 {
-  static const late_pulse pulses[] = {{8, 8}, {12, 4}, {15, 5}, {30, 10}, {3, 1}, {45, 45}};
+  static const late_pulse pulses[] = {{8, 8},   {12, 4}, {15, 5}, {30, 10}, {3, 1},
+                                      {45, 45}, {2, 1},  {5, 3},  {10, 20}, {25, 4}};
   late_def def = {.scene = name, .ticks = 2500, .run_ticks = 1};
   late_result still;
   hap_status status = late_run(b, &def, &still);

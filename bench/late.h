@@ -29,6 +29,7 @@ typedef struct late_result {
   double peak; /* N */
   double step; /* N, largest change from tick to tick */
   unsigned steps;
+  double gave; /* J, largest that the force gave to the hand since it had taken most */
   uint64_t missed;
   uint64_t derated; /* ticks with less force */
   uint32_t fault;   /* hap_fault at the end */

@@ -27,6 +27,7 @@
 #define HAPI_SAFETY_JUMP_LEAST 0.0005        /* m */
 #define HAPI_SAFETY_DOUBT_FADE_S 0.014       /* s */
 #define HAPI_SAFETY_UNEXPLAINED_S 0.03       /* s */
+#define HAPI_SAFETY_HANDLE 0.05              /* m */
 #define HAPI_SAFETY_MISFIT_S 0.3             /* s */
 #define HAPI_SAFETY_JUDGE_S 1e-3             /* s */
 #define HAPI_SAFETY_QUANTA 3.0               /* 1 */

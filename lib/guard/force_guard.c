@@ -19,8 +19,6 @@
  * Slew before saturation holds both bounds: the force before lies within its limit, and shortening
  * is the projection onto a ball, which brings no two points farther apart. */
 
-#define HANDLE 0.05 /* m, arm of a grip: what the way explains of a torque */
-
 void hapi_fault_set(hapi_fault_latch *latch, hap_fault fault, uint32_t pointer, uint32_t generation)
 {
   if (latch->fault == HAP_FAULT_NONE) {
@@ -157,9 +155,9 @@ static void limit_unexplained(double period, hapi_pointer *p)
   double explained = p->device.jumped ? 0.0 : stiffness * hapi_v3_norm(g->moved);
   bool force = vector_slew(g->written.force, explained + slow * p->device.limits.max_force,
                            p->device.wrench.force);
-  bool torque =
-      vector_slew(g->written.torque, HANDLE * explained + slow * p->device.limits.max_torque,
-                  p->device.wrench.torque);
+  bool torque = vector_slew(g->written.torque,
+                            HAPI_SAFETY_HANDLE * explained + slow * p->device.limits.max_torque,
+                            p->device.wrench.torque);
   p->guard.flags |= force || torque ? HAP_GUARD_INPUT : 0;
 }
 

@@ -38,6 +38,9 @@
 
 #define AXES 3
 
+/* What else takes force, or moves the device by what it has taken. */
+#define OTHER_REASONS (HAP_GUARD_LATE | HAP_GUARD_INPUT | HAP_GUARD_RAMP_IN | HAP_GUARD_STALE)
+
 /* J, by moving bodies at the pointers' contacts. A force that is meant to be felt as vibration
  * belongs here, too. */
 static void note_given(const hapi_tick_facts *facts, const hapi_pointers *pointers,
@@ -244,7 +247,7 @@ static bool pointer_swings(hapi_pointer *p, const hap_wrench *felt, const double
     axes_hear(s, s->torque, felt->torque, s->turned,
               p->proxied ? p->coupling.spin_stiffness : arm2 * stiffness, seconds);
   }
-  if (p->device.jumped) { /* nobody knows the way there */
+  if (p->device.jumped || (p->guard.flags & OTHER_REASONS) != 0) { /* the way is not the force's */
     for (int i = 0; i < AXES; ++i) {
       s->force[i].count = s->torque[i].count = 0;
     }
@@ -299,7 +302,9 @@ void hapi_oscillation_follow(hapi_guard *guard, const hapi_tick_facts *facts,
     }
     wrench_limited(p, limits, &felt);
     swings_derate(s, pointer_swings(p, &felt, limits, facts->elapsed), facts->elapsed);
-    bool away = hapi_runaway_follow(&s->runaway, p, felt.force, limits[0], facts->elapsed);
+    bool as_asked = (p->guard.flags & (OTHER_REASONS | HAP_GUARD_ENERGY)) == 0;
+    bool away =
+        hapi_runaway_follow(&s->runaway, p, felt.force, as_asked ? limits[0] : 0.0, facts->elapsed);
     if (away || s->counted >= HAPI_SAFETY_SWING_HALVES) {
       hapi_fault_set(&guard->latch, HAP_FAULT_OSCILLATION, i + 1, p->generation);
     }

@@ -80,7 +80,7 @@ bool hapi_runaway_follow(hapi_runaway *runaway, const hapi_pointer *pointer, con
     return runaway_ask(r, against, seconds);
   }
   r->loss = hapi_max(r->loss - seconds / HAPI_SAFETY_RAMP_IN_S, 0.0);
-  if (!(against > 0.0) || pointer->device.jumped) {
+  if (!(against > 0.0) || !(limit > 0.0) || pointer->device.jumped) {
     r->stage = RUNAWAY_IDLE;
     return false;
   }
