@@ -507,15 +507,17 @@ const char *hap_fault_text(hap_fault fault)
       return "hap_emergency_zero was called; force is zero until the fault is reset";
     case HAP_FAULT_LATE:
       return "the haptic loop came too late under force (missed_ticks); give it real time or less "
-             "to do; force is zero until the fault is reset";
+             "to do (docs/realtime.md, What a machine must provide); force is zero until the fault "
+             "is reset";
     case HAP_FAULT_OSCILLATION:
       return "the device swung by itself, or ran away from a surface, at high force; lower the "
              "stiffness, or check delay, damping and the sign of each axis (docs/safety.md, "
              "Oscillation); force is zero until the fault is reset";
     case HAP_FAULT_BLOCKED:
-      return "the loop stood still and a watchdog took the force off; force is zero until the "
-             "fault "
-             "is reset";
+      return "the loop stood still and a watchdog took the force off: a device hangs, or other "
+             "programs hold the processors (docs/realtime.md, What a machine must provide); force "
+             "is "
+             "zero until the fault is reset";
   }
   return "";
 }
