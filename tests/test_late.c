@@ -329,6 +329,21 @@ TEST(what_the_hand_went_in_a_gap_is_not_pressed_in_at_once)
   CHECK_NEAR(p->guard.wanted.force[0], -6.0, 1e-9);
 }
 
+TEST(a_contact_that_ended_in_a_gap_pushes_no_more)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  double gave = 0.0;
+  ticks_miss(9);
+  for (int i = 0; i < 15; ++i) { /* out of the wall, and on at 1 m/s */
+    double force = p->device.wrench.force[0];
+    p->device.pose.position[0] -= i == 0 ? 0.01 : 1e-3;
+    gave += i == 0 ? 0.0 : force * -1e-3;
+    ticks_run(1);
+  }
+  printf("# %.3g mJ after the gap\n", 1e3 * gave);
+  CHECK(gave < 1e-3); /* 20 mJ at 0.8 N a tick, down from 5 N */
+}
+
 TEST(the_spring_of_a_proxy_is_not_stretched_at_once_by_a_gap)
 {
   hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);

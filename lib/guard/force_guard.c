@@ -173,7 +173,11 @@ static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
   double torque_rate = fault ? hapi_max(p->device.limits.slew_torque,
                                         p->device.limits.max_torque / HAPI_SAFETY_FADE_S)
                              : p->device.limits.slew_torque;
-  if (!fault && guard->late.slew_s > 0.0) { /* what a gap has changed is not felt at once */
+  /* What a gap has changed is not felt at once. But a force that the world asks no more, as a
+   * contact has ended, would be energy for the hand that draws back. */
+  bool asked = hapi_v3_dot(g->wanted.force, g->wanted.force) >=
+               hapi_v3_dot(g->written.force, g->written.force);
+  if (!fault && guard->late.slew_s > 0.0 && asked) {
     force_rate = hapi_min(force_rate, p->device.limits.max_force / HAPI_SAFETY_LATE_SLEW_S);
     torque_rate = hapi_min(torque_rate, p->device.limits.max_torque / HAPI_SAFETY_LATE_SLEW_S);
   }
