@@ -45,9 +45,7 @@ static inline double hapi_ramp_follow(hapi_ramp *r, bool *io_seen, const hapi_po
     hapi_contact_ramp_begin(r, depth, p->device.jump_s > 0.0);
     *io_seen = true;
   } else if (r->share < 1.0 || r->excess > 0.0 || p->device.stood > 0.0) {
-    /* In slow motion nothing is caught up, until there is less force. */
-    bool waits = r->held || (p->device.slow && p->guard.late_loss <= 0.0);
-    double comes_in = waits ? 0.0 : HAPI_SAFETY_CONTACT_SPEED * period;
+    double comes_in = r->held ? 0.0 : HAPI_SAFETY_CONTACT_SPEED * period;
     r->share = depth > 0.0 ? hapi_min(r->share + period / HAPI_SAFETY_CONTACT_RAMP_S, 1.0) : 1.0;
     double went_on = p->device.stood * hapi_max(depth - hapi_max(r->depth, 0.0), 0.0);
     r->excess = hapi_max(hapi_min(r->excess, depth) - comes_in, 0.0) + went_on;

@@ -137,9 +137,10 @@ static bool input_is_plausible(const hapi_pointer *p)
           hapi_plausible(w, 3));
 }
 
-uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period,
-                            const hapi_coupling_late *late, double physics_period)
+uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double elapsed,
+                            double physics_period)
 {
+  double stood = elapsed - period > HAPI_SAFETY_LATE_GAP_S ? 1.0 - period / elapsed : 0.0;
   uint32_t unusable = 0;
   for (uint32_t i = 0; i < pointers->high; ++i) {
     hapi_pointer *p = &pointers->of[i];
@@ -147,8 +148,7 @@ uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period,
       continue;
     }
     bool good = input_is_plausible(p);
-    p->device.stood = p->device.placed ? late->stood : 0.0;
-    p->device.slow = late->slow;
+    p->device.stood = p->device.placed ? stood : 0.0;
     p->device.jumped = good && pointer_jumps(p, period);
     p->device.jump_s =
         p->device.jumped ? HAPI_SAFETY_JUMP_S + 2.0 * physics_period : p->device.jump_s - period;

@@ -9,16 +9,10 @@
 
 #include "pointer/pointer.h"
 
-/* How late ticks come: fields as of hapi_pointer_device. */
-typedef struct hapi_coupling_late {
-  double stood;
-  bool slow;
-} hapi_coupling_late;
-
 /* Device -> world, of all pointers. period and physics_period in s. Returns 1 + the index of the
  * first pointer whose pose cannot be used, which stays where it was; 0: all can. */
-uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period,
-                            const hapi_coupling_late *late, double physics_period);
+uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double elapsed,
+                            double physics_period);
 
 /* World wrench -> device wrench. */
 void hapi_coupling_write(hapi_pointer *pointer);

@@ -51,7 +51,6 @@ typedef struct hapi_pointer_device {
   uint32_t buttons;   /* in */
   double jump_s;      /* s, > 0: contacts that arrive deep are so because of a jump */
   double stood;       /* 0..1, share of the time since the last read in which ticks were missed */
-  bool slow;          /* so many were missed of late that bodies are in slow motion */
   double speed_limit; /* m/s, that a hand can make; 0: none */
   double motion_scale;
   double force_scale;

@@ -8,7 +8,6 @@
 #include "base/vec.h"
 #include "guard/energy_observer.h"
 #include "guard/force_guard.h"
-#include "guard/lateness.h"
 #include "guard/oscillation.h"
 #include "paper/local_dynamics.h"
 #include "paper/render.h"
@@ -116,10 +115,8 @@ void hapi_tick_read(hapi_tick *tick, int64_t now_ns)
   double since = facts->tick > 0 ? 1e-9 * (double)(now_ns - facts->read_ns) : 0.0;
   facts->elapsed = hapi_max(since, facts->period);
   facts->now_ns = facts->read_ns = now_ns;
-  hapi_coupling_late late;
-  hapi_lateness_tell(&tick->guard, facts, &late);
   uint32_t unusable =
-      hapi_coupling_read(&tick->pointers, facts->period, &late, facts->physics_period);
+      hapi_coupling_read(&tick->pointers, facts->period, facts->elapsed, facts->physics_period);
   if (unusable > 0) {
     hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, unusable);
   }
