@@ -367,6 +367,7 @@ static void driver_dies(rig *r, int number)
     if (number == 0) {
       _exit(0);
     }
+    (void)signal(number, SIG_DFL); /* a shell's job in the background ignores SIGINT */
     (void)raise(number);
     for (;;) {
       pause();
