@@ -2,8 +2,8 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
 """test_hardening.py HARDENING SANITIZE OPTIMIZATION BINARY...: whether the flags of meson.build are
-in the binaries. HARDENING is the option: link, full or off. Stack protector, fortified functions
-and CET are looked for with full."""
+in the binaries. HARDENING is what the build took: link, full or off. Stack protector, fortified
+functions and CET are looked for with full."""
 import re
 import shutil
 import subprocess

@@ -15,6 +15,7 @@ ALLOWED = set("""
     memcpy memset memmove memcmp
     sqrt fabs fmin fmax floor ceil trunc round rint nearbyint
     __stack_chk_fail _GLOBAL_OFFSET_TABLE_
+    __memcpy_chk __memset_chk __memmove_chk
     hapi_assert_failed
 """.split())
 SANITIZER = re.compile(r"__(asan|ubsan|tsan|sanitizer)_\w+$")
