@@ -13,13 +13,17 @@ import sys
 import tempfile
 
 
-def build(root, tree):
-    """The shared library."""
+def copy(root, tree):
     def others(folder, names):  # folders of builds lie in the root; build_*.c are sources
         return [name for name in names if os.path.samefile(folder, root) and
                 (name == ".git" or
                  os.path.exists(os.path.join(root, name, "meson-private")))]
     shutil.copytree(root, tree, symlinks=True, ignore=others)
+    return tree
+
+
+def build(tree):
+    """The shared library."""
     folder = os.path.join(tree, "build")
     subprocess.run(["meson", "setup", "--buildtype=release", "-Dtests=disabled", "-Dlint=disabled",
                     "-Dplots=disabled", "-Ddefault_library=shared",
@@ -37,9 +41,9 @@ def build(root, tree):
 
 def main(root):
     with tempfile.TemporaryDirectory() as folder:
-        first = build(root, os.path.join(folder, "a"))
-        second = build(root, os.path.join(folder, "another", "and", "longer", "one"))
-        same = filecmp.cmp(first, second, shallow=False)
+        names = ["a", os.path.join("another", "and", "longer", "one")]
+        trees = [copy(root, os.path.join(folder, name)) for name in names]  # of the same moment
+        same = filecmp.cmp(*[build(tree) for tree in trees], shallow=False)
         print(f"{'ok' if same else 'not ok'} 1 - the same bytes in two folders")
         print("1..1")
 
