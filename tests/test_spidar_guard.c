@@ -109,10 +109,13 @@ static bool is_guard(void)
   return prctl(PR_GET_NAME, name) == 0 && strcmp(name, "spidar-guard") == 0;
 }
 
+static int waited_ms; /* of the newest poll of a process that is no guard: what it asked for */
+
 int poll(struct pollfd *files, nfds_t count, int timeout)
 {
   int (*real)(struct pollfd *, nfds_t, int);
   REAL(real, "poll");
+  waited_ms = timeout;
   if (trouble.poll_interrupts > 0) {
     --trouble.poll_interrupts;
     errno = EINTR;
@@ -328,6 +331,7 @@ TEST(an_orderly_end_sends_nothing)
   REQUIRE(guard > 0);
   CHECK(process_is_named(guard, "spidar-guard"));
   hapi_spidar_guard_end(&r->guard, true);
+  CHECK(waited_ms == 1000); /* at most, for a guard that hangs */
   CHECK(r->guard.channel < 0);
   CHECK(guard_ends(guard));
   CHECK(is_quiet(r, 50));
