@@ -515,6 +515,9 @@ TEST(a_fork_that_fails_says_why)
   rig *r = rig_new();
   trouble.wait_killed = true;
   CHECK(!rig_start(r, STALL_S) && atomic_load(&r->guard.error) == ECANCELED);
+  trouble_over();
+  CHECK(rounds_read(r->board, r->zeros, PATIENCE_MS, 300) >= ROUNDS_LEAST); /* nobody wants it */
+  CHECK(guard_ends(guard_await(r)));
 }
 
 TEST(without_memory_there_is_no_guard)

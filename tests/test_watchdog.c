@@ -194,6 +194,26 @@ static stage *stuck_begin(int count)
   return s;
 }
 
+/* All of them have a force. A machine that holds the loop up before that latches a fault of its
+ * own, which is reset. */
+static bool stuck_hold(stage *s, int count)
+{
+  for (int ms = 0; ms < WAIT_MS; ++ms) {
+    int holding = 0;
+    for (int i = 0; i < count; ++i) {
+      holding += atomic_load(&devices[i].holds);
+    }
+    if (holding == count) {
+      return true;
+    }
+    if (ms % 100 == 99 && stats_of(s).faults.fault != HAP_FAULT_NONE) {
+      CHECK(hap_session_reset_fault(s->session) == HAP_OK);
+    }
+    sleep_ms(1);
+  }
+  return false;
+}
+
 static void stuck_end(stage *s, int count)
 {
   stage_end(s);
@@ -366,7 +386,8 @@ static void hang_in(atomic_int *block, const char *call)
 {
   stage *s = stuck_begin(1);
   stuck_device *d = &devices[0];
-  REQUIRE(await_value(&d->holds, 1));
+  REQUIRE(stuck_hold(s, 1));
+  uint64_t before = stats_of(s).faults.count;
   atomic_store(block, 1);
   REQUIRE(await_value(&d->inside, 1));
   CHECK(await_value(&d->holds, 0));
@@ -375,7 +396,7 @@ static void hang_in(atomic_int *block, const char *call)
   CHECK(took < 0.5);                   /* 0.05 where the machine does nothing else */
   CHECK(atomic_load(&d->inside) == 1); /* it still hangs, and the fault is told */
   hap_stats stats = stats_of(s);
-  CHECK(stats.faults.fault == HAP_FAULT_BLOCKED && stats.faults.count == 1);
+  CHECK(stats.faults.fault == HAP_FAULT_BLOCKED && stats.faults.count == before + 1);
   CHECK(stats.faults.pointer == hands[0].v);
   CHECK(text_has(detail_of(s), "pointer 1: ") && text_has(detail_of(s), "zero until the fault"));
   CHECK(text_has(detail_of(s), "device first") && text_has(detail_of(s), call));
@@ -385,11 +406,11 @@ static void hang_in(atomic_int *block, const char *call)
   CHECK(await_value(&d->inside, 0));
   await_ticks(s, 50);
   stats = stats_of(s); /* latched by the loop, once */
-  CHECK(stats.faults.fault == HAP_FAULT_BLOCKED && stats.faults.count == 1);
+  CHECK(stats.faults.fault == HAP_FAULT_BLOCKED && stats.faults.count == before + 1);
   CHECK(stats.faults.pointer == hands[0].v && text_has(detail_of(s), call));
   CHECK(atomic_load(&d->forces) == forces && atomic_load(&d->holds) == 0);
   CHECK(hap_session_reset_fault(s->session) == HAP_OK);
-  CHECK(await_value(&d->holds, 1) && stats_of(s).faults.count == 1);
+  CHECK(stuck_hold(s, 1));
   stuck_end(s, 1);
 }
 
@@ -413,7 +434,7 @@ TEST(a_write_that_gives_its_force_on_its_way_out_is_followed_by_zero)
   stage *s = stuck_begin(1);
   stuck_device *d = &devices[0];
   for (int i = 0; i < 5; ++i) {
-    REQUIRE(await_value(&d->holds, 1));
+    REQUIRE(stuck_hold(s, 1));
     atomic_store(&d->block_write, 1);
     REQUIRE(await_value(&d->inside, 1) && await_fault(s, HAP_FAULT_BLOCKED));
     int forces = atomic_load(&d->forces);
@@ -431,7 +452,7 @@ TEST(a_write_that_gives_its_force_on_its_way_out_is_followed_by_zero)
 TEST(a_zero_that_hangs_leaves_no_other_device_with_force)
 {
   stage *s = stuck_begin(2);
-  REQUIRE(await_value(&devices[0].holds, 1) && await_value(&devices[1].holds, 1));
+  REQUIRE(stuck_hold(s, 2));
   atomic_store(&devices[0].block_zero, 1);
   atomic_store(&devices[0].block_read, 1);
   CHECK(await_value(&devices[0].zeroing, 1)); /* its watchdog */
@@ -524,7 +545,7 @@ TEST(a_loop_that_is_not_woken_is_zeroed)
 TEST(a_stop_says_which_device_hangs_and_works_when_it_is_back)
 {
   stage *s = stuck_begin(2);
-  REQUIRE(await_value(&devices[0].holds, 1) && await_value(&devices[1].holds, 1));
+  REQUIRE(stuck_hold(s, 2));
   atomic_store(&devices[1].block_read, 1);
   REQUIRE(await_value(&devices[1].inside, 1));
   CHECK(hap_pointer_remove(s->session, hands[0]) == HAP_ERROR_TIMEOUT);
@@ -551,7 +572,7 @@ static int destroy_hanging(bool zero_too)
 {
   log_catch();
   stage *s = stuck_begin(2);
-  REQUIRE(await_value(&devices[0].holds, 1) && await_value(&devices[1].holds, 1));
+  REQUIRE(stuck_hold(s, 2));
   atomic_store(&devices[0].block_zero, zero_too);
   atomic_store(&devices[0].block_read, 1);
   REQUIRE(await_value(&devices[1].holds, 0) && await_value(&logs, zero_too ? 1 : 2));
@@ -609,7 +630,7 @@ static int run_stopped(bool hangs, int to_parent, int from_parent)
 {
   char byte = 0;
   stage *s = stuck_begin(1);
-  REQUIRE(await_value(&devices[0].holds, 1));
+  REQUIRE(stuck_hold(s, 1));
   if (hangs) {
     atomic_store(&devices[0].block_read, 1);
     REQUIRE(await_value(&devices[0].inside, 1));
