@@ -206,7 +206,8 @@ static bool stuck_hold(stage *s, int count)
     if (holding == count) {
       return true;
     }
-    if (ms % 100 == 99 && stats_of(s).faults.fault != HAP_FAULT_NONE) {
+    uint32_t fault = stats_of(s).faults.fault;
+    if (ms % 100 == 99 && (fault == HAP_FAULT_BLOCKED || fault == HAP_FAULT_LATE)) {
       CHECK(hap_session_reset_fault(s->session) == HAP_OK);
     }
     sleep_ms(1);
