@@ -511,7 +511,7 @@ const char *hap_fault_text(hap_fault fault)
              "is reset";
     case HAP_FAULT_OSCILLATION:
       return "the device swung by itself, or ran away from a surface, at high force; lower the "
-             "stiffness, or check delay, damping and the sign of each axis (docs/safety.md, "
+             "stiffness, or check delay, damping and the sign of each axis (docs/safety.md: "
              "Oscillation); force is zero until the fault is reset";
     case HAP_FAULT_BLOCKED:
       return "the loop stood still and a watchdog took the force off: a device hangs, or other "
