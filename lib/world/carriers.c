@@ -201,12 +201,26 @@ void hapi_carriers_begin_scan(hapi_carriers *carriers, bool syncs)
   carriers->seen_count = 0;
 }
 
-/* Whether it moved since the last sync. */
-static bool loose_moved(hapi_loose_geom *loose, double out_place[HAPI_GEOM_NUMBERS])
+/* As it was read last: of most geoms without a copy, as all of them are asked at each sync. */
+static bool place_is(dGeomID geom, int kind, const double place[HAPI_GEOM_NUMBERS])
 {
+  if (kind == dPlaneClass || kind == dHeightfieldClass) {
+    double now[HAPI_GEOM_NUMBERS];
+    place_read(geom, now);
+    return memcmp(now, place, sizeof now) == 0;
+  }
+  return memcmp(dGeomGetPosition(geom), place, 3 * sizeof *place) == 0 &&
+         memcmp(dGeomGetRotation(geom), place + 3, 12 * sizeof *place) == 0;
+}
+
+/* Whether it moved since the last sync. */
+static bool loose_moved(const hapi_loose_geom *loose, double out_place[HAPI_GEOM_NUMBERS])
+{
+  if (place_is(loose->geom, loose->kind, loose->place)) {
+    return false;
+  }
   place_read(loose->geom, out_place);
-  return memcmp(out_place, loose->place, sizeof loose->place) != 0 &&
-         hapi_finite(out_place, HAPI_GEOM_NUMBERS);
+  return hapi_finite(out_place, HAPI_GEOM_NUMBERS);
 }
 
 #define BOX_SAME 1e-9 /* m */
