@@ -606,6 +606,19 @@ TEST(after_another_start_a_geom_is_felt_as_a_body_is)
   }
 }
 
+/* Deprecated by ODE, and met in older programs. */
+static dGeomID transform_of(dSpaceID space, dGeomID inner)
+{
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wdeprecated-declarations"
+  dGeomID outer = dCreateGeomTransform(space);
+  dGeomTransformSetGeom(outer, inner);
+  dGeomTransformSetInfo(outer, 1);
+  dGeomTransformSetCleanup(outer, 1);
+#pragma GCC diagnostic pop
+  return outer;
+}
+
 /* Moved as a whole. A hull does not feel what is in a transform, and that is said once. */
 TEST(a_geom_in_a_transform_is_followed)
 {
@@ -614,10 +627,7 @@ TEST(a_geom_in_a_transform_is_followed)
   dGeomDestroy(m->geom);
   dGeomID box = dCreateBox(NULL, 0.2, 0.2, THICK);
   dGeomSetPosition(box, 0.0, 0.0, -0.03);
-  m->geom = dCreateGeomTransform(m->w.space);
-  dGeomTransformSetGeom(m->geom, box);
-  dGeomTransformSetInfo(m->geom, 1);
-  dGeomTransformSetCleanup(m->geom, 1);
+  m->geom = transform_of(m->w.space, box);
   m->middle[2] = 0.03 - 0.5 * THICK;
   moved_put(m, 0.0);
   cw_start(&m->w, 0.02, 0.01, RADIUS - 0.003);
