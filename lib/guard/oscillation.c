@@ -303,8 +303,8 @@ void hapi_oscillation_follow(hapi_guard *guard, const hapi_tick_facts *facts,
     wrench_limited(p, limits, &felt);
     swings_derate(s, pointer_swings(p, &felt, limits, facts->elapsed), facts->elapsed);
     bool as_asked = (p->guard.flags & (OTHER_REASONS | HAP_GUARD_ENERGY)) == 0;
-    bool away =
-        hapi_runaway_follow(&s->runaway, p, felt.force, as_asked ? limits[0] : 0.0, facts->elapsed);
+    bool away = hapi_runaway_follow(&s->runaway, p, felt.force, stiffness_felt(p),
+                                    as_asked ? limits[0] : 0.0, facts->elapsed);
     if (away || s->counted >= HAPI_SAFETY_SWING_HALVES) {
       hapi_fault_set(&guard->latch, HAP_FAULT_OSCILLATION, i + 1, p->generation);
     }

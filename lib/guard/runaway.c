@@ -28,29 +28,33 @@ enum {
   RUNAWAY_ASKING
 };
 
-/* On from here to a force of so many newtons. */
-static void runaway_level(hapi_runaway *r, double newtons, double speed)
+/* On from here, with a force of newtons, to a force of level. */
+static void runaway_level(hapi_runaway *r, double level, double newtons, double speed)
 {
-  r->level = newtons;
+  r->level = level;
+  r->newtons = newtons;
   r->speed = speed;
   r->work = r->way = 0.0;
 }
 
 /* At a level: what was gained against the force since the one before. */
-static void runaway_judge(hapi_runaway *r, double limit, double speed)
+static void runaway_judge(hapi_runaway *r, double newtons, double stiffness, double limit,
+                          double speed)
 {
   double gained = speed * speed - r->speed * r->speed;
   double gain = r->work > 0.0 ? gained / r->work : 0.0; /* 1/kg */
   bool stays = r->gain > 0.0 && gain >= HAPI_SAFETY_RUNAWAY_KEPT * r->gain &&
                gain >= 2.0 / HAPI_SAFETY_RUNAWAY_MASS;
   double full = HAPI_SAFETY_RUNAWAY_FULL * limit;
-  if (stays) {
+  /* A force that has come by no way of the device, as of a body that was put there, says nothing. */
+  bool followed = newtons - r->newtons <= HAPI_SAFETY_SWING_STIFFER * stiffness * r->way;
+  if (stays && followed) {
     r->stage = RUNAWAY_ASKING;
     r->acceleration = 0.5 * gained / r->way; /* mean on that way */
     r->seconds = 0.0;
   }
   r->gain = gain;
-  runaway_level(r, r->level < full ? full : 2.0 * r->level, speed);
+  runaway_level(r, r->level < full ? full : 2.0 * r->level, newtons, speed);
 }
 
 /* True: without force it accelerates no more. */
@@ -71,16 +75,18 @@ static bool runaway_ask(hapi_runaway *r, double speed, double seconds)
 }
 
 bool hapi_runaway_follow(hapi_runaway *runaway, const hapi_pointer *pointer, const double force[3],
-                         double limit, double seconds)
+                         double stiffness, double limit, double seconds)
 {
   hapi_runaway *r = runaway;
   double newtons = hapi_v3_norm(force);
   double against = newtons > 0.0 ? -hapi_v3_dot(force, pointer->handle.velocity) / newtons : 0.0;
-  if (r->stage == RUNAWAY_ASKING) {
+  bool other = pointer->contacts != r->contacts; /* what is touched has changed: nobody can tell */
+  r->contacts = pointer->contacts;
+  if (r->stage == RUNAWAY_ASKING && !other) {
     return runaway_ask(r, against, seconds);
   }
   r->loss = hapi_max(r->loss - seconds / HAPI_SAFETY_RAMP_IN_S, 0.0);
-  if (!(against > 0.0) || !(limit > 0.0) || pointer->device.jumped) {
+  if (other || !(against > 0.0) || !(limit > 0.0) || pointer->device.jumped) {
     r->stage = RUNAWAY_IDLE;
     return false;
   }
@@ -90,9 +96,9 @@ bool hapi_runaway_follow(hapi_runaway *runaway, const hapi_pointer *pointer, con
   if (r->stage == RUNAWAY_IDLE && newtons < begin) {
     r->stage = RUNAWAY_GROWING;
     r->gain = 0.0;
-    runaway_level(r, begin, against);
+    runaway_level(r, begin, newtons, against);
   } else if (r->stage == RUNAWAY_GROWING && newtons >= r->level) {
-    runaway_judge(r, limit, against);
+    runaway_judge(r, newtons, stiffness, limit, against);
   }
   return false;
 }

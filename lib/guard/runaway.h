@@ -8,9 +8,9 @@
 #include "pointer/pointer.h"
 
 /* Once a tick, seconds after the one before. force: N in the world, as the device is to get it;
- * limit: its largest, 0: the device gets less than this force. True: the force drives the device
- * the wrong way. */
+ * stiffness: N/m, that is touched; limit: the largest force, 0: the device gets less than this one.
+ * True: the force drives the device the wrong way. */
 bool hapi_runaway_follow(hapi_runaway *runaway, const hapi_pointer *pointer, const double force[3],
-                         double limit, double seconds);
+                         double stiffness, double limit, double seconds);
 
 #endif

@@ -62,13 +62,15 @@ typedef struct hapi_swing_axis {
 /* A device that goes faster and faster against the force. */
 typedef struct hapi_runaway {
   int stage;
-  double seconds; /* since the force was taken away to see */
-  double loss;    /* 0..1, share of the force that this takes */
-  double level;   /* N, the next one */
-  double speed;   /* m/s, at the last level; when the force was gone */
-  double work;    /* J, against the force since then */
-  double way;     /* m, likewise */
-  double gain;    /* 1/kg, up to the last level */
+  uint32_t contacts; /* of the pointer, at the last tick */
+  double seconds;    /* since the force was taken away to see */
+  double loss;       /* 0..1, share of the force that this takes */
+  double level;      /* N, the next one */
+  double newtons;    /* at the last level */
+  double speed;      /* m/s, at the last level; when the force was gone */
+  double work;       /* J, against the force since then */
+  double way;        /* m, likewise */
+  double gain;       /* 1/kg, up to the last level */
   double acceleration;
 } hapi_runaway;
 
