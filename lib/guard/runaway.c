@@ -46,7 +46,7 @@ static void runaway_judge(hapi_runaway *r, double newtons, double stiffness, dou
   bool stays = r->gain > 0.0 && gain >= HAPI_SAFETY_RUNAWAY_KEPT * r->gain &&
                gain >= 2.0 / HAPI_SAFETY_RUNAWAY_MASS;
   double full = HAPI_SAFETY_RUNAWAY_FULL * limit;
-  /* A force that has come by no way of the device, as of a body that was put there, says nothing. */
+  /* A force that came by no way of the device, as of a body put there, says nothing. */
   bool followed = newtons - r->newtons <= HAPI_SAFETY_SWING_STIFFER * stiffness * r->way;
   if (stays && followed) {
     r->stage = RUNAWAY_ASKING;
