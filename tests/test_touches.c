@@ -266,6 +266,54 @@ TEST(a_finger_slides_from_where_friction_lets_it_go)
   CHECK(events->kind == HAP_EVENT_STICK);
 }
 
+/* A belt runs below the finger, and a lift comes up to another one: speeds are those that the body
+ * sees. */
+TEST(speeds_are_against_the_body)
+{
+  hap_event e[EVENTS];
+  hap_touch touch = {0};
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID belt = ode_box(d->world, d->space, 1.0, AT(2.0, 0.2, 0.02), AT(0.0, 0.0, -0.01));
+  dBodySetKinematic(belt);
+  dBodySetLinearVel(belt, 0.3, 0.0, 0.0);
+  desk_run(d, 0.0, 0.0, RADIUS - 0.001);
+  desk_listen(d);
+  desk_wait(d, 100);
+  REQUIRE(touches_of(d, &touch, 1) == 1);
+  CHECK(touch.body == belt && touch.is_sliding == 1);
+  check_vector(touch.slip, -0.3, 0.0, 0.0, 1e-6);
+  tap_release(d);
+
+  d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID lift = ode_box(d->world, d->space, 1.0, AT(0.2, 0.2, 0.02), AT(0.0, 0.0, -0.03));
+  dBodySetKinematic(lift);
+  dBodySetLinearVel(lift, 0.0, 0.0, 0.2);
+  desk_run(d, 0.0, 0.0, RADIUS);
+  desk_listen(d);
+  desk_wait(d, 150);
+  REQUIRE(events_of(d, e) >= 2);
+  CHECK(e[0].kind == HAP_EVENT_TOUCH && e[0].body == lift);
+  CHECK_NEAR(e[0].speed, 0.2, 1e-3);
+  CHECK(llabs(e[0].time_ns - 100000000) <= 2000000); /* 20 mm away */
+  CHECK(e[1].kind == HAP_EVENT_IMPACT);              /* ended by its time: the lift goes on */
+  CHECK(llabs(e[1].time_ns - e[0].time_ns - 20000000) <= 1000000);
+}
+
+/* What is hit leaves: its speed before the blow counts. */
+TEST(a_ball_that_flies_at_the_finger_closes_with_its_speed)
+{
+  hap_event e[EVENTS];
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID ball = ode_ball(d->world, d->space, 0.001, 0.02, AT(0.1, 0.0, 0.0));
+  dBodySetLinearVel(ball, -0.5, 0.0, 0.0);
+  desk_run(d, 0.0, 0.0, 0.0);
+  desk_listen(d);
+  desk_wait(d, 400);
+  REQUIRE(events_of(d, e) >= 2);
+  CHECK(e[0].kind == HAP_EVENT_TOUCH && e[0].body == ball);
+  CHECK_NEAR(e[0].speed, 0.5, 1e-3);
+}
+
 TEST(touches_give_the_impulse_that_a_body_gets)
 {
   double sum[3] = {0.0, 0.0, 0.0};

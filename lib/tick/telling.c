@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "tick/telling.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/assert.h"
@@ -309,9 +310,11 @@ static void list_leave(const listening *at)
   at->list->buttons = 0;
 }
 
+/* False for NaN and infinity, too, which the guard makes a fault of. */
 static bool contact_pushes(const hapi_local_contact *c)
 {
-  return c->force[0] != 0.0 || c->force[1] != 0.0 || c->force[2] != 0.0;
+  double force2 = hapi_v3_dot(c->force, c->force);
+  return force2 > 0.0 && force2 < HUGE_VAL;
 }
 
 static void lists_gather(hapi_telling *telling, const hapi_tick *tick, hapi_event_ring *ring)
