@@ -37,6 +37,9 @@
  * it stays. While nothing is touched the ledger stands still, and a surplus is forgotten: it must
  * not pay for what a later touch makes of nothing.
  *
+ * What is declared (pointer/declared.h) is no entry: neither is it paid for, nor held back. It has
+ * limits of its own.
+ *
  * A torque is paid as a force is, for the turn that the device made; those of friction on a device
  * that does not turn a hull are left out: they are small beside its forces' work. */
 
@@ -232,9 +235,9 @@ static double couplings_store(const hapi_pointers *pointers)
   return sum;
 }
 
-/* J that the written force gave to the hand in the seconds since the last tick. A way that no hand
- * goes in that time is a jump: nobody put in what it would have cost, and nobody got more than at
- * the fastest. */
+/* J that the written force of contacts gave to the hand in the seconds since the last tick. A way
+ * that no hand goes in that time is a jump: nobody put in what it would have cost, and nobody got
+ * more than at the fastest. */
 static double port_gave(hapi_pointer *p, double seconds)
 {
   hapi_guard_pointer *g = &p->guard;
@@ -252,8 +255,8 @@ static double port_gave(hapi_pointer *p, double seconds)
     hapi_v3_set(g->turned, 0.0, 0.0, 0.0);
     g->placed = true;
   }
-  double gave = world_per_device(p) * (hapi_v3_dot(g->written.force, g->moved) +
-                                       hapi_v3_dot(g->written.torque, g->turned));
+  double gave = world_per_device(p) * (hapi_v3_dot(g->contact.force, g->moved) +
+                                       hapi_v3_dot(g->contact.torque, g->turned));
   double way = hapi_v3_norm(g->moved);
   double farthest = p->device.speed_limit * seconds;
   if (!p->device.jumped) {
@@ -276,8 +279,8 @@ static bool settle_ports(hapi_guard *guard, const hapi_pointers *pointers, int64
   for (uint32_t i = 0; i < pointers->high; ++i) {
     hapi_pointer *p = &pointers->of[i];
     if (p->generation != 0) {
-      felt = felt || is_any(p->device.wrench.force) || is_any(p->guard.written.force) ||
-             is_any(p->guard.written.torque);
+      felt = felt || is_any(p->device.wrench.force) || is_any(p->guard.contact.force) ||
+             is_any(p->guard.contact.torque);
       guard->balance -= port_gave(p, seconds);
     }
   }

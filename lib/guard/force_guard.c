@@ -14,7 +14,8 @@
 /* The last thing between the simulation and the motors, in this order: finite, age of the local
  * model, ramp-in, doubt about the device, energy observer, what no motion explains, slew,
  * saturation. All of it shapes what the hand feels; the bodies have had their share of the impulse
- * before.
+ * before. What is declared (pointer/declared.h) has the same shares, is added behind the observer,
+ * and has the same limits.
  *
  * Slew before saturation holds both bounds: the force before lies within its limit, and shortening
  * is the projection onto a ball, which brings no two points farther apart. */
@@ -50,6 +51,7 @@ void hapi_guard_reset_fault(hapi_guard *guard, const hapi_pointers *pointers,
 void hapi_guard_cut(hapi_pointer *pointer)
 {
   memset(&pointer->guard.written, 0, sizeof pointer->guard.written);
+  memset(&pointer->guard.contact, 0, sizeof pointer->guard.contact);
 }
 
 static bool vector_is_usable(const double v[3])
@@ -86,18 +88,28 @@ static void follow_age(hapi_guard *guard, const hapi_tick_facts *facts)
   guard->age_loss = hapi_min(hapi_max(guard->age_loss + change, 0.0), 1.0);
 }
 
+static void wrench_scale(double share, hap_wrench *io)
+{
+  hapi_v3_scale(share, io->force, io->force);
+  hapi_v3_scale(share, io->torque, io->torque);
+}
+
 /* What the device shall get before the limits. */
 static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p)
 {
   hapi_guard_pointer *g = &p->guard;
   hapi_coupling_write(p);
   g->wanted = p->device.wrench;
+  if (p->declared.any) {
+    hapi_wrench_add(&g->wanted, &p->declared.given);
+  }
   g->flags = 0;
   if (guard->latch.fault != HAP_FAULT_NONE) {
     bool fades = guard->latch.fault == HAP_FAULT_LATE;
     g->flags = HAP_GUARD_FAULT;
     hapi_v3_scale(fades ? guard->late.fade : 0.0, g->written.force, p->device.wrench.force);
     hapi_v3_scale(fades ? guard->late.fade : 0.0, g->written.torque, p->device.wrench.torque);
+    memset(&p->declared.given, 0, sizeof p->declared.given); /* it is in what was written */
     return;
   }
   if (guard->mode == HAP_GUARD_MEASURE) {
@@ -112,8 +124,10 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
   g->flags |= p->belief.doubted || p->belief.loss > 0.0 ? HAP_GUARD_INPUT : 0;
   g->flags |= g->late_loss > 0.0 ? HAP_GUARD_LATE : 0;
   g->flags |= g->swings.taken > 0.0 ? HAP_GUARD_OSCILLATION : 0;
-  hapi_v3_scale(share, p->device.wrench.force, p->device.wrench.force);
-  hapi_v3_scale(share, p->device.wrench.torque, p->device.wrench.torque);
+  wrench_scale(share, &p->device.wrench);
+  if (p->declared.any) {
+    wrench_scale(share, &p->declared.given);
+  }
 }
 
 /* No farther from the vector before than step. */
@@ -129,14 +143,15 @@ static bool vector_slew(const double before[3], double step, double v[3])
   return true;
 }
 
-/* Shortens a vector to a norm; its direction stays. */
-static bool vector_saturate(double v[3], double limit)
+/* Shortens a vector to a norm; its direction stays, and its part has the same share as before. */
+static bool vector_saturate(double v[3], double limit, double part[3])
 {
   double norm = hapi_v3_norm(v);
   if (norm <= limit) {
     return false;
   }
   hapi_v3_scale(limit / norm, v, v);
+  hapi_v3_scale(limit / norm, part, part);
   return true;
 }
 
@@ -186,13 +201,28 @@ static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
 }
 
+static void report_declared(hapi_pointer *p)
+{
+  const hapi_declared *d = &p->declared;
+  hapi_v3_sub(p->guard.written.force, d->given.force, p->guard.contact.force);
+  hapi_v3_sub(p->guard.written.torque, d->given.torque, p->guard.contact.torque);
+  hapi_wrench_add(&p->wrench, &d->follows);
+  hapi_wrench_add(&p->wrench, &d->driven);
+  if (p->device.three_dof) {
+    hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
+  }
+}
+
 /* What is reported is what the hand feels. */
 static void report_written(hapi_pointer *p)
 {
   const double *q = p->device.pose_world_device.quat_wxyz;
-  p->guard.written = p->device.wrench;
+  p->guard.written = p->guard.contact = p->device.wrench;
   if (p->device.three_dof || !p->device.feels_torque) {
     hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
+  }
+  if (p->declared.any) {
+    report_declared(p);
   }
   if (p->guard.flags == 0) {
     return;
@@ -241,14 +271,19 @@ void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *poi
     if (p->generation == 0) {
       continue;
     }
+    if (p->declared.any) {
+      hapi_wrench_add(&p->device.wrench, &p->declared.given);
+    }
     if (guard->mode == HAP_GUARD_ON) {
       if (guard->latch.fault == HAP_FAULT_NONE) {
         limit_unexplained(period, p);
       }
       limit_slew(guard, period, p);
     }
-    bool force_cut = vector_saturate(p->device.wrench.force, p->device.limits.max_force);
-    bool torque_cut = vector_saturate(p->device.wrench.torque, p->device.limits.max_torque);
+    bool force_cut = vector_saturate(p->device.wrench.force, p->device.limits.max_force,
+                                     p->declared.given.force);
+    bool torque_cut = vector_saturate(p->device.wrench.torque, p->device.limits.max_torque,
+                                      p->declared.given.torque);
     p->guard.flags |= force_cut || torque_cut ? HAP_GUARD_SATURATED : 0;
     /* Whatever came in, and whatever went wrong here: NaN does not get to the motors. */
     if (!hapi_guard_usable(&p->device.wrench)) {

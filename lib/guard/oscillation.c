@@ -34,21 +34,25 @@
  * latches after so many halves in all.
  *
  * What is judged is the force before the guard. It says how far the device swings at the stiffness
- * that was asked for, whatever has been taken. */
+ * that was asked for, whatever has been taken. Of what is declared (pointer/declared.h), the part
+ * that follows the hand is judged with the contacts; a part that goes by time feeds the device as a
+ * moving body does, by the work that it does on it. */
 
 #define AXES 3
 
 /* What else takes force, or moves the device by what it has taken. */
 #define OTHER_REASONS (HAP_GUARD_LATE | HAP_GUARD_INPUT | HAP_GUARD_RAMP_IN | HAP_GUARD_STALE)
 
-/* J, by moving bodies at the pointers' contacts. A force that is meant to be felt as vibration
- * belongs here, too. */
+/* J, by moving bodies at the pointers' contacts, and by what is meant as a vibration. */
 static void note_given(const hapi_tick_facts *facts, const hapi_pointers *pointers,
                        const hapi_bodies *bodies, const hapi_touches *touches)
 {
-  for (uint32_t i = 0; facts->model != HAP_MODEL_CONTACT && i < pointers->high; ++i) {
+  for (uint32_t i = 0; i < pointers->high; ++i) {
     hapi_pointer *p = &pointers->of[i];
-    p->guard.swings.given += facts->period * p->guard.power;
+    if (facts->model != HAP_MODEL_CONTACT) {
+      p->guard.swings.given += facts->period * p->guard.power;
+    }
+    p->guard.swings.given += p->declared.work;
   }
   for (uint32_t i = 0; facts->model == HAP_MODEL_CONTACT && i < touches->count; ++i) {
     const hapi_local_contact *c = &touches->of[i];
@@ -202,8 +206,9 @@ static bool axis_follow(hapi_swing_axis *s, const hapi_swing_end *now, double la
 /* N/m, no less than what turns a way of the device into force. */
 static double stiffness_felt(const hapi_pointer *p)
 {
-  return p->proxied ? p->coupling.stiffness
-                    : p->surface.stiffness * hapi_max((double)p->contacts, 1.0);
+  double touched = p->proxied ? p->coupling.stiffness
+                              : p->surface.stiffness * hapi_max((double)p->contacts, 1.0);
+  return touched + p->declared.stiffness;
 }
 
 static bool axes_follow(hapi_swings *swings, hapi_swing_axis axes[AXES], const double force[3],
@@ -264,6 +269,9 @@ static void wrench_limited(const hapi_pointer *p, double limits[2], hap_wrench *
       p->device.force_scale > 0.0 ? p->device.limits.max_force / p->device.force_scale : 0.0;
   limits[1] = scale > 0.0 ? p->device.limits.max_torque / scale : 0.0;
   *out = p->wrench;
+  if (p->declared.any) {
+    hapi_wrench_add(out, &p->declared.follows);
+  }
   (void)hapi_v3_shorten(out->force, limits[0]);
   (void)hapi_v3_shorten(out->torque, limits[1]);
 }
@@ -303,6 +311,10 @@ void hapi_oscillation_follow(hapi_guard *guard, const hapi_tick_facts *facts,
     wrench_limited(p, limits, &felt);
     swings_derate(s, pointer_swings(p, &felt, limits, facts->elapsed), facts->elapsed);
     bool as_asked = (p->guard.flags & (OTHER_REASONS | HAP_GUARD_ENERGY)) == 0;
+    if (p->declared.any) { /* a device runs away from all that it is given */
+      hapi_v3_add(felt.force, p->declared.driven.force, felt.force);
+      (void)hapi_v3_shorten(felt.force, limits[0]);
+    }
     bool away = hapi_runaway_follow(&s->runaway, p, felt.force, stiffness_felt(p),
                                     as_asked ? limits[0] : 0.0, facts->elapsed);
     if (away || s->counted >= HAPI_SAFETY_SWING_HALVES) {

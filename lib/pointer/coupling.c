@@ -137,6 +137,18 @@ static bool input_is_plausible(const hapi_pointer *p)
           hapi_plausible(w, 3));
 }
 
+/* Over a jump nothing is known of the way. */
+static void declared_begin(hapi_pointer *p, const hapi_pointer_handle *before, double elapsed)
+{
+  double way[3] = {0.0, 0.0, 0.0};
+  double turn[3] = {0.0, 0.0, 0.0};
+  if (!p->device.jumped) {
+    hapi_v3_sub(p->handle.position, before->position, way);
+    hapi_v3_scale(elapsed, p->handle.spin, turn);
+  }
+  hapi_declared_begin(&p->declared, way, turn);
+}
+
 uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double elapsed,
                             double physics_period)
 {
@@ -154,7 +166,11 @@ uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double
         p->device.jumped ? HAPI_SAFETY_JUMP_S + 2.0 * physics_period : p->device.jump_s - period;
     pointer_check_speed(p);
     const hapi_pointer_handle before = p->handle;
-    if (!good || !pointer_place(p)) {
+    bool placed = good && pointer_place(p);
+    if (p->declared.any || p->declared.was) {
+      declared_begin(p, &before, elapsed);
+    }
+    if (!placed) {
       unusable = unusable == 0 ? i + 1 : unusable;
     } else if (p->device.jumped) {
       hapi_proxy_begin_anew(p);
@@ -169,20 +185,30 @@ uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double
  * scale. */
 double hapi_coupling_torque_scale(const hapi_pointer *p)
 {
-  return p->device.three_dof || !p->device.feels_torque
+  return p->device.three_dof || !(p->device.feels_torque || p->declared.any)
              ? 0.0
              : p->device.force_scale / p->device.motion_scale;
 }
 
-void hapi_coupling_write(hapi_pointer *p)
+static void wrench_to_device(const hapi_pointer *p, const hap_wrench *world, hap_wrench *out)
 {
   double torque_scale = hapi_coupling_torque_scale(p);
-  to_device(p, p->wrench.force, p->device.wrench.force);
-  hapi_v3_scale(p->device.force_scale, p->device.wrench.force, p->device.wrench.force);
+  to_device(p, world->force, out->force);
+  hapi_v3_scale(p->device.force_scale, out->force, out->force);
   if (torque_scale == 0.0) {
-    hapi_v3_set(p->device.wrench.torque, 0.0, 0.0, 0.0);
+    hapi_v3_set(out->torque, 0.0, 0.0, 0.0);
   } else {
-    to_device(p, p->wrench.torque, p->device.wrench.torque);
-    hapi_v3_scale(torque_scale, p->device.wrench.torque, p->device.wrench.torque);
+    to_device(p, world->torque, out->torque);
+    hapi_v3_scale(torque_scale, out->torque, out->torque);
+  }
+}
+
+void hapi_coupling_write(hapi_pointer *p)
+{
+  wrench_to_device(p, &p->wrench, &p->device.wrench);
+  if (p->declared.any) {
+    hap_wrench sum = p->declared.follows;
+    hapi_wrench_add(&sum, &p->declared.driven);
+    wrench_to_device(p, &sum, &p->declared.given);
   }
 }

@@ -13,6 +13,7 @@
 #include <hapode/pointer.h>
 #include <hapode/spatial.h>
 
+#include "pointer/declared.h"
 #include "pointer/swings.h"
 #include "pointer/velocity.h"
 #include "sync/messages.h"
@@ -163,6 +164,7 @@ typedef struct hapi_guard_pointer {
   double turned[3];   /* rad, likewise, of a device that gives torque */
   hap_wrench wanted;  /* before the guard */
   hap_wrench written; /* at the last tick; in force until the next write */
+  hap_wrench contact; /* of that, without what was declared */
   uint32_t flags;     /* hap_guard_flag, of the last tick */
   double limit;       /* N in the world, of the device */
   double felt;        /* 0..1, share after ramp-in and age */
@@ -178,7 +180,8 @@ typedef struct hapi_pointer {
   bool rigid;          /* one whose contacts do not give: god-object and virtual tool */
   hap_pose pose;
   hap_twist twist;
-  hap_wrench wrench; /* on the hand */
+  hap_wrench wrench; /* on the hand: of contacts; after the guard with what is declared */
+  hapi_declared declared;
   hapi_pointer_shape shape;
   hapi_pointer_surface surface;
   hapi_pointer_device device;

@@ -6,6 +6,7 @@
 
 #include "base/hash.h"
 #include "base/vec.h"
+#include "pointer/coupling.h"
 
 static void report_bodies(const hapi_bodies *from, hapi_state *out)
 {
@@ -247,6 +248,21 @@ void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail)
   atomic_store_explicit(&trail->written, row + 1, memory_order_release);
 }
 
+static void path_take_declared(const hapi_pointer *p, hap_wrench *io)
+{
+  const double *q = p->device.pose_world_device.quat_wxyz;
+  double scale = hapi_coupling_torque_scale(p);
+  hap_wrench given;
+  hapi_quat_rotate(q, p->declared.given.force, given.force);
+  hapi_quat_rotate(q, p->declared.given.torque, given.torque);
+  if (p->device.force_scale > 0.0) {
+    hapi_v3_madd(io->force, -1.0 / p->device.force_scale, given.force, io->force);
+  }
+  if (scale > 0.0) {
+    hapi_v3_madd(io->torque, -1.0 / scale, given.torque, io->torque);
+  }
+}
+
 void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path)
 {
   hapi_path_pointer *out = hapi_path_next(path);
@@ -267,6 +283,9 @@ void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path)
                                  .pose = p->pose,
                                  .twist = p->twist,
                                  .wrench = p->wrench};
+    if (p->declared.any) { /* looking back knows of contacts alone */
+      path_take_declared(p, &out[i].wrench);
+    }
   }
   hapi_path_send(path, tick->facts.now_ns);
 }
