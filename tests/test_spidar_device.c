@@ -77,15 +77,15 @@ static void rig_flush(void *self)
   r->port.flush(r->port.self);
 }
 
-/* Of a hand that holds still. */
-static rig *rig_new(void)
+/* The hand goes there, m from home, as soon as motors pull. */
+static rig *rig_at(const char *path)
 {
   int ends[2];
   void *self = NULL;
   hap_detail detail = {""};
   rig *r = tap_own(sizeof *r, rig_end);
   r->ops = &driven_spidar_ops;
-  REQUIRE(r->ops->open("0:0/0/0", &self, &detail) == HAP_OK);
+  REQUIRE(r->ops->open(path, &self, &detail) == HAP_OK);
   r->driven = self;
   r->device = &r->driven->device;
   REQUIRE(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) == 0);
@@ -94,6 +94,12 @@ static rig *rig_new(void)
   memset(r->device->zeros, 0x5a, ZEROS);
   r->device->zero_count = ZEROS;
   return r;
+}
+
+/* Of a hand that holds still. */
+static rig *rig_new(void)
+{
+  return rig_at("0:0/0/0");
 }
 
 static void rig_tell(rig *r, const char *line)
@@ -215,6 +221,75 @@ TEST(a_calibration_that_fits_no_pose_is_no_start)
   CHECK(r->ops->start(r->driven) == HAP_OK && r->device->model.calibrated);
 }
 
+/* Encoders that are four times finer, of 16 bits all the same. They were at first_count at home. */
+static void rig_calibrate(rig *r, hapi_spidar_model *fine, int first_count)
+{
+  hap_pose home = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  double lengths[HAPI_SPIDAR_STRINGS_MAX];
+  hapi_spidar_lengths(fine, &home, lengths);
+  for (int i = 0; i < fine->strings; ++i) {
+    fine->metres_per_count[i] *= 0.25;
+    fine->offset[i] = lengths[i] - first_count * fine->metres_per_count[i];
+  }
+  fine->calibrated = r->device->model_calibrated = true;
+  r->device->model = *fine;
+  r->driven->emulator.model = fine;
+  r->driven->emulator.first_count = first_count;
+}
+
+/* 40 mm from home, some 4500 counts, where the counts of some strings have wrapped. */
+TEST(a_calibrated_grip_is_found_away_from_home)
+{
+  static const int first[] = {0, 40000, -40000};
+  for (int i = 0; i < 3; ++i) {
+    rig *r = rig_at("0:0.025/0.03/0.025");
+    hapi_spidar_model fine = r->device->model;
+    hapi_spidar_tensions least;
+    const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    double tension[HAPI_SPIDAR_STRINGS_MAX];
+    hap_wrench best;
+    hap_wrench given;
+    rig_calibrate(r, &fine, first[i]);
+    CHECK(r->ops->start(r->driven) == HAP_OK);
+    const hap_pose *place = &r->driven->emulator.grip.pose;
+    CHECK(hapi_v3_norm(place->position) > 0.03);
+    for (int k = 0; k < 3; ++k) {
+      CHECK_NEAR(r->device->belief.solver.pose.position[k], place->position[k], 1e-4);
+    }
+    /* The strings have been wound in for the place where it is. */
+    hapi_spidar_tensions_init(&least, &fine);
+    CHECK(hapi_spidar_tensions_solve(&least, &fine, place, &none, tension, &best) == HAP_OK);
+    hapi_spidar_wrench(&fine, place, r->driven->emulator.pull, &given);
+    for (int k = 0; k < 3; ++k) {
+      CHECK_NEAR(given.force[k], best.force[k], 0.03);
+    }
+    r->driven->emulator.model = hapi_spidar_model_find("x4r");
+    tap_release(r);
+  }
+}
+
+TEST(strings_stay_taut_after_the_start)
+{
+  rig *r = rig_start();
+  CHECK(!atomic_load(&r->device->zeroed));
+  for (int i = 0; i < 20; ++i) {
+    CHECK(rig_read(r) == HAP_OK);
+  }
+  for (int i = 0; i < 8; ++i) {
+    CHECK_NEAR(r->driven->emulator.pull[i], r->device->model.min_tension, 0.05);
+  }
+}
+
+/* 10 bits a byte of 2 Mbit/s, and a tick. */
+TEST(the_delay_is_that_of_the_commands)
+{
+  rig *r = rig_new();
+  hap_device_info info = {.mass = 0.0};
+  r->device->zero_count = HAPI_SPIDAR_ZEROS_BEFORE + 74;
+  r->ops->describe(r->driven, &info);
+  CHECK_NEAR(info.delay, 1e-3 + 74 * 10 / 2e6, 1e-12);
+}
+
 /* ---- writes ---- */
 
 TEST(nothing_but_numbers_becomes_currents)
@@ -272,9 +347,16 @@ TEST(no_force_is_told_where_none_is_wanted)
   CHECK(rig_push(r, little, 50, &status) == 50);
   r->ops->held(r->driven, &held);
   CHECK_NEAR(held.force[0], little, 0.5 * little);
-  /* A geometry in which they do not balance is told: as if the pose were far from home. */
-  r->device->belief.solver.pose.position[0] = 0.03;
+  /* Away from home the least tensions leave more, up to a hundredth of the limit. */
   const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hap_wrench given;
+  hap_pose *pose = &r->device->belief.solver.pose;
+  pose->position[0] = 0.022;
+  CHECK(r->ops->write(r->driven, &none, &held) >= HAP_OK && hapi_v3_norm(held.force) == 0.0);
+  hapi_spidar_wrench(&r->device->model, pose, r->device->tensions.tension, &given);
+  CHECK(hapi_v3_norm(given.force) > 0.003 * r->device->settings.max_force);
+  /* A geometry in which they do not balance is told: as if the pose were far from home. */
+  pose->position[0] = 0.03;
   CHECK(r->ops->write(r->driven, &none, &held) >= HAP_OK);
   CHECK(hapi_v3_norm(held.force) > 0.01 * r->device->settings.max_force);
 }
@@ -362,6 +444,20 @@ TEST(after_a_zero_boards_are_asked_without_a_force)
   }
   memcpy(pull, r->driven->emulator.pull, sizeof pull);
   CHECK(fmax(fmax(pull[0], pull[1]), fmax(pull[2], pull[3])) > 0.5);
+}
+
+TEST(a_stop_sends_zeros_twice_and_leaves_the_guard_nothing_to_do)
+{
+  hap_wrench held;
+  hap_status status = HAP_OK;
+  rig *r = rig_start();
+  CHECK(rig_push(r, 2.0, 10, &status) == 10 && zeros_come(r) == 0);
+  CHECK(atomic_load(&r->device->guard.pulse->pulling));
+  hapi_spidar_ops.stop(r->device);
+  CHECK(zeros_come(r) == 2 * ZEROS && !r->device->running);
+  CHECK(!atomic_load(&r->device->guard.pulse->pulling));
+  hapi_spidar_ops.held(r->device, &held);
+  CHECK(hapi_v3_norm(held.force) == 0.0 && hapi_v3_norm(held.torque) == 0.0);
 }
 
 /* ---- faults ---- */

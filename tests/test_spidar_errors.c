@@ -523,6 +523,7 @@ typedef struct fake {
   int used;
   int given;
   int model; /* that board 0 answers to a question; 0: nothing */
+  int sent;  /* commands that it took */
 } fake;
 
 static void fake_add(fake *f, const void *bytes, int count)
@@ -540,6 +541,7 @@ static int fake_send(void *self, const uint8_t *bytes, int count)
     --f->full;
     return -EAGAIN;
   }
+  ++f->sent;
   if (f->send_error == 0 && kind != NULL && count > HAPI_SPIDAR_FRAME_MAX &&
       bytes[HAPI_SPIDAR_FRAME_MAX] == hapi_spidar_header(HAPI_SPIDAR_BOARD_INFO, 0)) {
     const uint8_t answer[7] = {bytes[HAPI_SPIDAR_FRAME_MAX], (uint8_t)f->model,
@@ -655,6 +657,52 @@ TEST(an_exchange_that_fails_says_how)
   f->receive_error = 0;
   f->send_error = EIO;
   CHECK(hapi_spidar_line_exchange(&line, none, 0.1) == HAP_ERROR_DEVICE);
+}
+
+/* A board that is just switched on may miss a question, a busy machine an answer. */
+TEST(each_board_is_asked_three_times_for_10_ms)
+{
+  hapi_spidar_boards found;
+  hap_detail detail = {""};
+  fake *f = fake_new(0);
+  CHECK(hapi_spidar_line_find(&f->port, &found, &detail) == HAP_ERROR_DEVICE);
+  CHECK(f->sent == 3 * HAPI_SPIDAR_BOARDS);
+  CHECK_NEAR(f->now, 0.01 * f->sent, 1e-9);
+}
+
+TEST(a_command_without_an_answer_is_sent_again_every_5_ms)
+{
+  const int16_t none[8] = {0};
+  hapi_spidar_line line;
+  fake *f = fake_new(7);
+  REQUIRE(hapi_spidar_line_begin(&line, &f->port, &one_b5m, 1e6) == HAP_OK);
+  f->sent = 0;
+  CHECK(hapi_spidar_line_exchange(&line, none, 0.1) == HAP_ERROR_TIMEOUT);
+  CHECK(f->sent >= 19 && f->sent <= 21);
+}
+
+/* A reply of the board with one string at raw, after seconds of silence. */
+static int reply_comes(fake *f, hapi_spidar_line *line, double seconds, int raw)
+{
+  uint8_t bytes[HAPI_SPIDAR_REPLIES_MAX];
+  hapi_spidar_frame frame = {.board = 0, .command = HAPI_SPIDAR_CURRENT};
+  frame.position[2] = (int16_t)raw;
+  fake_add(f, bytes, hapi_spidar_encode(&frame, 7, HAPI_SPIDAR_FROM_BOARD, bytes));
+  f->now += seconds;
+  return hapi_spidar_line_receive(line);
+}
+
+TEST(a_string_goes_32_counts_and_what_its_speed_allows)
+{
+  hapi_spidar_line line;
+  fake *f = fake_new(7);
+  REQUIRE(hapi_spidar_line_begin(&line, &f->port, &one_b5m, 1000.0) == HAP_OK);
+  CHECK(reply_comes(f, &line, 0.001, 500) == 1); /* the first may be anywhere */
+  CHECK(reply_comes(f, &line, 0.0105, 543) == 0 && line.bad_steps == 1);
+  CHECK(reply_comes(f, &line, 0.0, 542) == 1 && line.bad_steps == 0);
+  CHECK(reply_comes(f, &line, 0.0005, 542 - 33) == 0);
+  CHECK(reply_comes(f, &line, 0.0, 542 - 32) == 1);
+  CHECK(reply_comes(f, &line, 1e6, 542 - 32 + 32767) == 1); /* as far as numbers go */
 }
 
 SET_UP

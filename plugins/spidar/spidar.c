@@ -362,28 +362,6 @@ static bool begin_line(hapi_spidar_device *device, const hapi_spidar_port *port)
          HAP_OK;
 }
 
-/* Winds the strings in by the least tension, which is about no force at home, and looks where they
- * are. */
-static bool strings_tauten(hapi_spidar_device *device)
-{
-  const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  hap_wrench given;
-  bool good = hapi_spidar_line_exchange(&device->line, device->current, ANSWER_S) >= HAP_OK;
-  double end = now_s(device) + TAUT_S;
-  while (good && now_s(device) < end) {
-    (void)strings_pull(device, &none, &given);
-    lower_zero(device);
-    atomic_fetch_add(&device->guard.pulse->beats, 1);
-    good = hapi_spidar_line_exchange(&device->line, device->current, ANSWER_S) >= HAP_OK;
-    if (device->model.calibrated) {
-      (void)solve_pose(device);
-    }
-  }
-  /* The least tension may stay without anybody who writes: the guard has nothing to do yet. */
-  atomic_store(&device->guard.pulse->pulling, false);
-  return good;
-}
-
 /* Boards count in 16 bits, so of all that a count may be it is the one whose length is nearest to
  * that at home: strings are shorter than a wrap. */
 static void unwrap_counts(hapi_spidar_device *device)
@@ -399,6 +377,31 @@ static void unwrap_counts(hapi_spidar_device *device)
   }
 }
 
+/* Winds the strings in by the least tension, which is about no force at home, and looks where they
+ * are. */
+static bool strings_tauten(hapi_spidar_device *device)
+{
+  const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hap_wrench given;
+  bool good = hapi_spidar_line_exchange(&device->line, device->current, ANSWER_S) >= HAP_OK;
+  double end = now_s(device) + TAUT_S;
+  if (good && device->model.calibrated) {
+    unwrap_counts(device);
+  }
+  while (good && now_s(device) < end) {
+    (void)strings_pull(device, &none, &given);
+    lower_zero(device);
+    atomic_fetch_add(&device->guard.pulse->beats, 1);
+    good = hapi_spidar_line_exchange(&device->line, device->current, ANSWER_S) >= HAP_OK;
+    if (device->model.calibrated) {
+      (void)solve_pose(device);
+    }
+  }
+  /* The least tension may stay without anybody who writes: the guard has nothing to do yet. */
+  atomic_store(&device->guard.pulse->pulling, false);
+  return good;
+}
+
 /* Where the grip is now: by the calibration that there is, else it is taken to be at home. A fit
  * that does not arrive is none. */
 static bool settle_pose(hapi_spidar_device *device)
@@ -407,7 +410,6 @@ static bool settle_pose(hapi_spidar_device *device)
   hapi_spidar_fit fit = HAPI_SPIDAR_FIT_POOR;
   hapi_spidar_belief_begin(&device->belief, &device->model, NULL);
   if (device->model.calibrated) {
-    unwrap_counts(device);
     fit = HAPI_SPIDAR_FIT_MOVING;
     for (int i = 0; i < 20 && fit == HAPI_SPIDAR_FIT_MOVING; ++i) {
       fit = solve_pose(device);
