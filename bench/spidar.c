@@ -149,7 +149,7 @@ static void motion_follow(const spidar_motion *motion, figures *f, sums *s)
     int64_t now_ns = tick * (int64_t)1000000;
     hapi_spidar_rates_update(&rates, model, now_ns, counts, rate);
     hapi_spidar_twist(model, &solver.pose, rate, &twist[0]);
-    hapi_velocity_update(&velocity, now_ns, &solver.pose, &twist[1]);
+    hapi_velocity_update(&velocity, now_ns, &solver.pose, 0.0, &twist[1]);
     difference_of(&before, &solver.pose, &twist[2]);
     for (int k = 0; k < 3 && tick > HAPI_SPIDAR_RATES_SAMPLES; ++k) {
       add_velocity(s, k, &twist[k], &true_twist);

@@ -100,8 +100,12 @@ TEST(a_device_that_is_slow_to_tell_is_believed)
   false_input_init(&def);
   def.device = FALSE_INPUT_COARSE;
   for (int i = 0; i < 3; ++i) {
+    false_input_figures f;
     def.haptic_hz = rates[i];
     look_at_all(&def, kinds, sizeof kinds / sizeof kinds[0]);
+    /* At most 0.03 m/s: a spring of 1000 N/m that goes on every 4 ms, and little of the damper. */
+    false_input_compare(&def, &right, &right, &f);
+    CHECK(f.step_right <= 0.2);
   }
 }
 
@@ -228,6 +232,20 @@ TEST(a_device_that_does_not_believe_itself_comes_in_later)
     (void)hapi_input_judge(&hand, hand_ns, true);
   }
   CHECK(hand.belief.loss == 1.0);
+}
+
+/* Known after one way that is more than noise; not of a device that tells at every tick. */
+TEST(how_seldom_a_device_tells)
+{
+  for (int every = 1; every <= 4; ++every) {
+    hand_begin();
+    hand.velocity.quantum = 5e-5;
+    CHECK(hapi_input_gap(&hand, 1e-3) == 0.0);
+    for (int i = 0; i < 100; ++i) {
+      (void)hand_tell(2e-4 * (i - i % every), MS);
+    }
+    CHECK_NEAR(hapi_input_gap(&hand, 1e-3), every > 1 ? 1e-3 * every : 0.0, 1e-12);
+  }
 }
 
 /* Steps of a hand's fast motion, told every so many ticks; also when it begins and turns. */

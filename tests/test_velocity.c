@@ -73,7 +73,7 @@ static void motion_run(const motion *m)
     hap_twist twist;
     x[i] = QUANTUM * round(motion_position(m, i * 1e-3) / QUANTUM);
     pose.position[1] = x[i];
-    hapi_velocity_update(&velocity, i * MS, &pose, &twist);
+    hapi_velocity_update(&velocity, i * MS, &pose, 0.0, &twist);
     t.truth[i] = motion_speed(m, i * 1e-3);
     t.adaptive[i] = twist.linear[1];
     t.plain[i] = i > 0 ? (x[i] - x[i - 1]) * 1e3 : 0.0;
@@ -158,7 +158,7 @@ TEST(stop_is_noticed_within_the_window)
   for (int i = 0; i < 300; ++i) {
     double x = 0.2 * fmin(i, 200) * 1e-3; /* 0.2 m/s, then at once at rest */
     hap_pose pose = {{QUANTUM * round(x / QUANTUM), 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-    hapi_velocity_update(&velocity, i * MS, &pose, &twist);
+    hapi_velocity_update(&velocity, i * MS, &pose, 0.0, &twist);
     CHECK(i < 5 || i > 200 || fabs(twist.linear[0] - 0.2) < 0.01);
     CHECK(i < 202 || fabs(twist.linear[0]) <= 0.031); /* at most one quantum per tick */
     CHECK(i < 240 || twist.linear[0] == 0.0);
@@ -178,14 +178,70 @@ TEST(missed_ticks_do_no_harm)
     now += 700000 + rand() % 600000 + (rand() % 20 == 0 ? (rand() % 50) * MS : 0);
     double x = 0.05 * (double)now * 1e-9;
     hap_pose pose = {{0.0, 0.0, QUANTUM * round(x / QUANTUM)}, {1.0, 0.0, 0.0, 0.0}};
-    hapi_velocity_update(&velocity, now, &pose, &twist);
+    hapi_velocity_update(&velocity, now, &pose, 0.0, &twist);
     hap_twist again;
-    hapi_velocity_update(&velocity, now, &pose, &again); /* the same time twice changes nothing */
+    hapi_velocity_update(&velocity, now, &pose, 0.0, &again); /* the same time twice */
     CHECK(memcmp(&again, &twist, sizeof twist) == 0);
     worst = i > 40 ? fmax(worst, fabs(twist.linear[2] - 0.05)) : worst;
   }
   printf("# worst error of 50 mm/s: %.2f mm/s\n", 1e3 * worst);
   CHECK(worst < 2.5e-3);
+}
+
+/* A device that tells a position every 4 ms, read at two rates: as if it were read every 4 ms. It
+ * comes to rest after 2 s. One position of five is late by half a ms. */
+TEST(a_device_that_tells_seldom_is_sampled_as_seldom)
+{
+  for (int per_ms = 1; per_ms <= 10; per_ms += 9) {
+    hapi_velocity fast;
+    hapi_velocity slow;
+    hap_twist read = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    hap_twist told = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+    double worst = 0.0;
+    double stops = 0.0;
+    hapi_velocity_reset(&fast, QUANTUM);
+    hapi_velocity_reset(&slow, QUANTUM);
+    for (int i = 0; i < 2200 * per_ms; ++i) {
+      int since = i % (4 * per_ms);
+      bool late = per_ms == 10 && i / (4 * per_ms) % 5 == 0;
+      if (since == (late ? per_ms / 2 : 0)) {
+        double time = fmin(1e-3 * i / per_ms, 2.0);
+        pose.position[0] = QUANTUM * round((0.1 * time + 0.005 * sin(9.0 * time)) / QUANTUM);
+        hapi_velocity_update(&slow, i * MS / per_ms, &pose, 0.0, &told);
+      }
+      hapi_velocity_update(&fast, i * MS / per_ms, &pose, 4e-3, &read);
+      bool moves = i > 200 * per_ms && i < 1990 * per_ms;
+      worst = moves ? fmax(worst, fabs(read.linear[0] - told.linear[0])) : worst;
+      stops = fabs(read.linear[0]) > QUANTUM / 4e-3 ? 1e-3 * i / per_ms : stops;
+    }
+    printf("# %d kHz: %.2g m/s off, stands after %.1f ms\n", per_ms, worst, 1e3 * (stops - 2.0));
+    CHECK(worst < 1e-12);
+    CHECK(stops > 1.9 && stops < 2.012);
+    CHECK(read.linear[0] == 0.0);
+  }
+}
+
+/* One of 4 ms, 2 ms late: a mean over the 2 ms until the next one, and not over 1 ms. */
+TEST(a_position_that_is_late_makes_no_speed)
+{
+  for (int late = 0; late <= 2; ++late) { /* ms */
+    hapi_velocity velocity;
+    hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+    double fastest = 0.0;
+    hapi_velocity_reset(&velocity, QUANTUM);
+    for (int i = 0; i < 400; ++i) {
+      if (i % 4 == 0 && i != 200) {
+        pose.position[0] = 2e-4 * i;
+      } else if (i == 200 + late) {
+        pose.position[0] = 2e-4 * 200;
+      }
+      hapi_velocity_update(&velocity, i * MS, &pose, 4e-3, &twist);
+      fastest = i > 20 ? fmax(fastest, twist.linear[0]) : fastest;
+    }
+    CHECK_SAY(fastest < 0.41, "%d ms late: %g m/s of 0.2", late, fastest);
+  }
 }
 
 TEST(turning_has_its_angular_velocity)
@@ -198,7 +254,7 @@ TEST(turning_has_its_angular_velocity)
     double side = i % 3 == 0 ? -1.0 : 1.0;
     hap_pose pose = {{0.0, 0.0, 0.0},
                      {side * cos(half), side * 0.6 * sin(half), 0.0, side * 0.8 * sin(half)}};
-    hapi_velocity_update(&velocity, i * MS, &pose, &twist);
+    hapi_velocity_update(&velocity, i * MS, &pose, 0.0, &twist);
     if (i > 0) {
       CHECK_NEAR(twist.angular[0], 12.0, 1e-3);
       CHECK_NEAR(twist.angular[1], 0.0, 1e-9);
@@ -217,13 +273,13 @@ TEST(bad_poses_and_times_begin_anew)
     for (int i = 0; i < 60; ++i) {
       hap_pose pose = {{i * 1e-3, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
       pose.position[1] = i == 30 ? bad[k] : 0.0;
-      hapi_velocity_update(&velocity, i * MS, &pose, &twist);
+      hapi_velocity_update(&velocity, i * MS, &pose, 0.0, &twist);
       bool first = i == 0 || i == 30 || i == 31;
       CHECK_NEAR(twist.linear[0], first ? 0.0 : 1.0, 1e-9);
       CHECK(twist.linear[1] == 0.0);
     }
     hap_pose pose = {{5.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-    hapi_velocity_update(&velocity, 10 * MS, &pose, &twist); /* back in time */
+    hapi_velocity_update(&velocity, 10 * MS, &pose, 0.0, &twist); /* back in time */
     CHECK(twist.linear[0] == 0.0);
   }
 }

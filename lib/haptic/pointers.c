@@ -255,7 +255,8 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     bool believed =
         haptic->tick.guard.mode != HAP_GUARD_ON || hapi_input_judge(p, now_ns, in.doubted);
     if (slot->has_device && p->device.estimates && believed) {
-      hapi_velocity_update(&p->velocity, now_ns, &p->device.pose, &p->device.twist);
+      double gap = hapi_input_gap(p, haptic->tick.facts.period);
+      hapi_velocity_update(&p->velocity, now_ns, &p->device.pose, gap, &p->device.twist);
     }
   }
 }

@@ -24,6 +24,8 @@
  * several ticks. They are known by the time before each change of more than some quanta; the
  * shortest of the newest ones counts, as a device that rested looks the same once. */
 
+#define GAP_TICKS 1.5 /* ticks between two positions, from which on the device is slow */
+
 static double seconds_between(int64_t from_ns, int64_t to_ns)
 {
   return 1e-9 * (double)(to_ns - from_ns);
@@ -324,6 +326,12 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
   b->read_ns = now_ns;
   doubt_follow(p, doubted || !believed, seconds);
   return believed;
+}
+
+double hapi_input_gap(const hapi_pointer *pointer, double period)
+{
+  double gap = gap_of(&pointer->belief);
+  return gap > GAP_TICKS * period ? gap : 0.0;
 }
 
 void hapi_input_forgive(hapi_pointer *pointer)

@@ -12,6 +12,10 @@
  * Nothing is done with a pointer that the application moves, or a pose that is not finite. */
 bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted);
 
+/* s between two positions of a device that tells each for several ticks; 0: it tells at every tick,
+ * or it is not known yet. */
+double hapi_input_gap(const hapi_pointer *pointer, double period);
+
 /* After a reset of a fault: what was doubted before does not count. */
 void hapi_input_forgive(hapi_pointer *pointer);
 

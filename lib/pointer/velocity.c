@@ -2,14 +2,20 @@
  * SPDX-License-Identifier: MIT */
 #include "pointer/velocity.h"
 
+#include <string.h>
+
 #include "base/plausible.h"
 #include "base/vec.h"
+
+#define LATE_GAPS 1.25 /* a position is late after so many times the gap between two */
+#define SOON_GAPS 0.75 /* and only late when it comes within so many more */
 
 void hapi_velocity_reset(hapi_velocity *velocity, double quantum)
 {
   velocity->quantum = quantum;
   velocity->newest = 0;
   velocity->count = 0;
+  velocity->again = false;
 }
 
 static const hapi_velocity_sample *sample_at(const hapi_velocity *velocity, uint32_t age)
@@ -23,16 +29,25 @@ static double age_seconds(const hapi_velocity *velocity, uint32_t age)
   return (double)(sample_at(velocity, 0)->time_ns - sample_at(velocity, age)->time_ns) * 1e-9;
 }
 
-static void add_sample(hapi_velocity *velocity, int64_t time_ns, const hap_pose *pose)
+/* Of a device that tells seldom, a position told again is a sample when the next one is late. If
+ * that one comes soon after, it was only late, and takes the place of the sample. */
+static void add_sample(hapi_velocity *velocity, int64_t time_ns, const hap_pose *pose, double gap)
 {
-  int64_t before_ns = sample_at(velocity, 0)->time_ns;
-  if (velocity->count > 0 && time_ns < before_ns) {
+  const hapi_velocity_sample *before = sample_at(velocity, 0);
+  if (velocity->count > 0 && time_ns < before->time_ns) {
     velocity->count = 0;
   }
-  if (velocity->count == 0 || time_ns > before_ns) {
+  double since = 1e-9 * (double)(time_ns - before->time_ns);
+  bool told = velocity->count > 0 && memcmp(pose, &before->pose, sizeof *pose) == 0;
+  if (told && since < LATE_GAPS * gap) {
+    return;
+  }
+  bool late = !told && velocity->again && since < SOON_GAPS * gap;
+  if (velocity->count == 0 || (time_ns > before->time_ns && !late)) {
     velocity->newest = (velocity->newest + 1) % HAPI_VELOCITY_SAMPLES;
     velocity->count += velocity->count < HAPI_VELOCITY_SAMPLES;
   }
+  velocity->again = told;
   velocity->samples[velocity->newest] = (hapi_velocity_sample){time_ns, *pose};
 }
 
@@ -95,14 +110,14 @@ static void turn_measure(const hapi_velocity *velocity, double out[3])
 }
 
 void hapi_velocity_update(hapi_velocity *velocity, int64_t time_ns, const hap_pose *pose,
-                          hap_twist *out)
+                          double gap, hap_twist *out)
 {
   *out = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   if (!hapi_plausible(pose->position, 3) || !hapi_plausible(pose->quat_wxyz, 4)) {
     velocity->count = 0;
     return;
   }
-  add_sample(velocity, time_ns, pose);
+  add_sample(velocity, time_ns, pose, gap);
   if (velocity->count < 2) {
     return;
   }

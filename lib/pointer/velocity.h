@@ -11,6 +11,7 @@
  * window of the end-fit and the slope of the best fit. Times are those of the samples, so missed
  * ticks do no harm. */
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include <hapode/spatial.h>
@@ -30,6 +31,7 @@ typedef struct hapi_velocity {
   double quantum; /* m */
   uint32_t newest;
   uint32_t count;                                      /* of valid samples */
+  bool again;                                          /* the newest one was told before it, too */
   hapi_velocity_sample samples[HAPI_VELOCITY_SAMPLES]; /* a ring */
 } hapi_velocity;
 
@@ -38,8 +40,10 @@ void hapi_velocity_reset(hapi_velocity *velocity, double quantum);
 
 /* Takes the pose at time_ns and gives the twist there, in the frame of the pose; zero after the
  * first sample. A pose at the time of the one before takes its place. A pose that is not plausible,
- * and a time that goes back, make it begin anew. */
+ * and a time that goes back, make it begin anew. gap: s between two positions of a device that
+ * tells each of them for several ticks; 0: it tells a new one at every tick. Samples are then as
+ * far apart: the same position told again says nothing before another one is due. */
 void hapi_velocity_update(hapi_velocity *velocity, int64_t time_ns, const hap_pose *pose,
-                          hap_twist *out);
+                          double gap, hap_twist *out);
 
 #endif
