@@ -30,7 +30,7 @@ typedef struct loop {
 static void loop_frame(loop *l, double clock_s, double frame_s, double period)
 {
   l->now_ns += (int64_t)llround(1e9 * clock_s);
-  hapi_frame_steps f = hapi_frame_take(&l->remainder_s, frame_s, period, l->now_ns, l->last_ns);
+  hapi_frame_steps f = hapi_frame_take(&l->remainder_s, frame_s, period, 3, l->now_ns, l->last_ns);
   CHECK(f.count >= 0 && f.count <= 3 && (f.dropped == 0 || f.count == 3));
   for (int i = 0; i < f.count; ++i) {
     int64_t at = f.first_ns + i * f.apart_ns;

@@ -267,6 +267,51 @@ TEST(a_change_of_model_does_not_show)
   CHECK(slowest >= 0.1 && fastest <= 1.6);
 }
 
+static dBodyID born; /* in a callback or an edit */
+
+static void cube_bear(void *arg)
+{
+  stage *s = arg;
+  born = born != NULL ? born : add_cube(s, 0.7, NULL);
+}
+
+static void cube_bear_in_step(void *user, double step_s)
+{
+  (void)step_s;
+  cube_bear(user);
+}
+
+/* Where the world may be touched a body may be made, and the next frame has it. */
+TEST(a_body_is_drawn_from_its_first_frame)
+{
+  for (int way = 0; way < 4; ++way) {
+    stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
+    hap_pose pose;
+    born = NULL;
+    s->ode.before_step = way == 0 ? cube_bear_in_step : s->ode.before_step;
+    s->ode.after_step = way == 1 ? cube_bear_in_step : s->ode.after_step;
+    REQUIRE(stage_create(s) == HAP_OK);
+    REQUIRE(hap_session_start(s->session) == HAP_OK);
+    if (way == 2) {
+      CHECK(hap_session_post(s->session, cube_bear, s) == HAP_OK);
+    }
+    if (way == 3) {
+      CHECK(hap_session_lock(s->session) == HAP_OK);
+      cube_bear(s);
+      CHECK(hap_session_unlock(s->session) == HAP_OK);
+    }
+    for (int i = 0; born == NULL && i < 200; ++i) {
+      CHECK(hap_session_advance(s->session, 1) == HAP_OK);
+    }
+    REQUIRE(born != NULL);
+    CHECK(hap_session_poses(s->session, hap_session_now(s->session), &born, 1, &pose) == HAP_OK);
+    CHECK_NEAR(pose.position[0], 0.7, 1e-12);
+    CHECK(hap_session_poses_now(s->session, &born, 1, &pose) == HAP_OK);
+    CHECK_NEAR(pose.position[0], 0.7, 1e-12);
+    stage_end(s);
+  }
+}
+
 TEST(bodies_are_made_and_destroyed)
 {
   stage *s = stage_running(HAP_DRIVE_LOCKSTEP);
@@ -512,6 +557,7 @@ TEST(a_proxy_and_its_device_are_drawn_apart)
 TEST(now_is_the_newest_of_the_loop_and_what_the_world_would_come_to)
 {
   hap_pose poses[2];
+  hap_detail detail = {""};
   stage *s = stage_new(HAP_DRIVE_LOCKSTEP);
   dBodySetLinearVel(s->cube, 0.5, 0.0, 0.0);
   dBodyID far = add_cube(s, 0.0, NULL);
@@ -535,7 +581,10 @@ TEST(now_is_the_newest_of_the_loop_and_what_the_world_would_come_to)
   both[1] = unknown;
   memset(poses, 0x5a, sizeof poses);
   CHECK(hap_session_poses_now(s->session, both, 2, poses) == HAP_ERROR_NOT_FOUND);
-  CHECK(((unsigned char *)poses)[0] == 0x5a);
+  CHECK(poses[0].quat_wxyz[0] > 0.9); /* it is known */
+  CHECK(((unsigned char *)&poses[1])[0] == 0x5a);
+  CHECK(hap_session_detail(s->session, &detail) == HAP_OK &&
+        strstr(detail.text, "bodies[1] of 2 is not known") != NULL);
   CHECK(hap_session_poses_now(NULL, both, 1, poses) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_poses_now(s->session, NULL, 1, poses) == HAP_ERROR_ARGUMENT);
   CHECK(hap_session_poses_now(s->session, NULL, 0, NULL) == HAP_OK);

@@ -441,6 +441,23 @@ TEST(changes_of_time)
   (void)check_setup(&s);
 }
 
+static void change_rate(rig *r, int look)
+{
+  static const double rates[] = {17.0, 120.0, 60.0, 333.0, 1000.0 / 3.0};
+  static const hap_model models[] = {HAP_MODEL_CONTACT, HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE};
+  CHECK(hap_session_set_physics_hz(r->session, rates[look % 5]) == HAP_OK);
+  if (look % 4 == 3) {
+    CHECK(hap_session_set_model(r->session, models[look / 4 % 3]) == HAP_OK);
+  }
+}
+
+TEST(changes_of_rate)
+{
+  recorded_setup s = recorded_setup_of("stack", HAP_MODEL_CONTACT, 900);
+  s.meanwhile = change_rate;
+  (void)check_setup(&s);
+}
+
 static void ramp_time(rig *r, int look)
 {
   CHECK(hap_session_set_time_scale(r->session, 0.2 + 0.05 * (look % 16)) == HAP_OK);

@@ -156,9 +156,14 @@ HAP_NODISCARD HAP_API hap_status hap_session_set_moved_callback(hap_session *ses
  * A time that nobody knows yet gives the newest pose of each body, and HAP_STALE when that is
  * later by more than a step: physics is late or paused, or time_ns is in the future, such as a
  * predicted time of display. At least 7 steps are kept (model SINGLE: 1.5); before them
- * HAP_CLAMPED gives the oldest. HAP_ERROR_NOT_FOUND: a body is not known, and its element of out
- * is untouched. A body is known from the next step on, or from hap_session_adopt_body. One call
- * for many bodies is cheaper than many; none of them keeps the haptic thread waiting. */
+ * HAP_CLAMPED gives the oldest. One call for many bodies is cheaper than many; none of them keeps
+ * the haptic thread waiting.
+ *
+ * HAP_ERROR_NOT_FOUND: some body is not known. hap_session_detail names the first one's place,
+ * elements of unknown bodies are untouched, all others are written. A body that was made while the
+ * session runs is known when hap_session_unlock, before_step, after_step or the posted edits of a
+ * step have ended, so that its first frame has it; where it has neither geom nor joint, from
+ * hap_session_adopt_body on. */
 HAP_API hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyID *bodies,
                                      size_t count, hap_pose *out);
 

@@ -70,6 +70,10 @@ typedef struct hap_session_def {
   double budget;
   const struct hap_expert_def *expert;     /* copied by create; NULL (default): its defaults */
   const struct hap_research_def *research; /* copied by create; NULL (default): its defaults */
+
+  /* FRAME: 1..64, default 3: physics steps that one hap_session_update may run. More catch up after
+   * a long frame, and make the next one longer. */
+  int32_t max_steps_per_update;
 } hap_session_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
@@ -102,8 +106,8 @@ HAP_NODISCARD HAP_API hap_status hap_session_start(hap_session *session);
 HAP_API hap_status hap_session_stop(hap_session *session);
 
 /* [control] FRAME: runs the whole physics steps that fit into frame_s plus the remainder of earlier
- * calls, at most 3. frame_s is the time since the last call, s, 0..86400. The rest is dropped and
- * counted (HAP_DROPPED, hap_stats.physics.frames_dropped).
+ * calls, at most max_steps_per_update. frame_s is the time since the last call, s, 0..86400. The
+ * rest is dropped and counted (HAP_DROPPED, hap_stats.physics.frames_dropped).
  *
  * Slow motion and pauses: hap_session_set_time_scale. Less frame time than the clock's leaves the
  * world behind the loop. After two steps without a frame the force fades; it comes back by itself.
@@ -134,6 +138,14 @@ HAP_NODISCARD HAP_API hap_status hap_session_set_model(hap_session *session, hap
  * surfaces to the bodies'. HAP_ERROR_ARGUMENT: out of range. HAP_ERROR_STATE: the session plays a
  * recording, which has the scales. */
 HAP_NODISCARD HAP_API hap_status hap_session_set_time_scale(hap_session *session, double scale);
+
+/* [any] Steps of the world a second, from the next sync on, until stop: a quarter of the def's
+ * physics_hz and more, at most haptic_hz and 1000. ERP and CFM stay meant for a step of the def's
+ * rate, so that springs and dampers stay the same. The error estimate (hap_expert_def.lookback)
+ * rests at other rates than the def's. Without effect in model SINGLE, whose steps are the loop's.
+ * HAP_ERROR_ARGUMENT: out of range. HAP_ERROR_STATE: the session plays a recording, which has the
+ * rates. */
+HAP_NODISCARD HAP_API hap_status hap_session_set_physics_hz(hap_session *session, double hz);
 
 /* [any] Clears a latched fault. From the next tick on force is felt again, over 20 ms. Where the
  * pointer is more than 10 mm deep by then, the rest comes in at 0.2 m/s. A fault that lasts latches

@@ -104,8 +104,7 @@ void hapi_physics_stats(hapi_physics *physics, hap_stats *out)
   out->physics.ms_p99 = 1e-6 * hapi_histogram_quantile_ns(&counts->cycle_ns, 0.99);
   out->physics.ms_max = 1e-6 * hapi_histogram_max_ns(&counts->cycle_ns);
   out->physics.duty =
-      1e-3 * out->physics.ms_mean /
-      hapi_config_period(&physics->config, (hap_model)atomic_load(&physics->wanted.model));
+      1e-3 * out->physics.ms_mean / hapi_wanted_period(&physics->wanted, &physics->config);
   const hapi_lock_figures *lock = &physics->lock.figures;
   out->edits.locks = atomic_load(&lock->count);
   out->edits.wait_ms_max = 1e-6 * (double)atomic_load(&lock->wait_most_ns);

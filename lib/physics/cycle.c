@@ -28,28 +28,33 @@ static double stopwatch_lap(stopwatch *watch)
   return seconds;
 }
 
-static double lead_of(const hapi_physics_config *config, hap_model model)
+/* s, that the world is ahead of the loop. */
+static double lead_of(const hapi_cycle *cycle)
 {
-  return model == HAP_MODEL_IMPULSE ? 1.0 / config->physics_hz : 0.0;
+  return cycle->model == HAP_MODEL_IMPULSE ? cycle->physics_s : 0.0;
 }
 
-/* A change of model changes how far ahead the world is: the step between makes up for it. */
-static void follow_model(hapi_physics *physics)
+/* A change of model or rate changes how far ahead the world is: the step between makes up for it.
+ * interval_ns: until the next cycle. */
+static void follow_model(hapi_physics *physics, int64_t interval_ns)
 {
-  hap_model wanted =
-      hapi_tape_wanted_model(&physics->tape, &physics->wanted, &physics->cycle, false);
-  double since_last = physics->cycle.probe_step_s;
-  physics->cycle.step_scale = physics->cycle.time_scale;
-  physics->cycle.time_scale = hapi_tape_wanted_scale(&physics->tape, &physics->wanted);
-  physics->cycle.step_s = since_last + lead_of(&physics->config, wanted) -
-                          lead_of(&physics->config, physics->cycle.model);
-  physics->cycle.step_s *= physics->cycle.step_scale;
-  if (physics->cycle.step_s < 1e-9) {
-    physics->cycle.step_s = 0.0;
+  hapi_cycle *cycle = &physics->cycle;
+  hap_model wanted = hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, false);
+  double lead_s = lead_of(cycle);
+  cycle->step_s = cycle->soft_s = cycle->probe_step_s;
+  cycle->step_scale = cycle->time_scale;
+  cycle->time_scale = hapi_tape_wanted_scale(&physics->tape, &physics->wanted);
+  cycle->model = wanted;
+  if (wanted != HAP_MODEL_SINGLE && interval_ns > 0) {
+    cycle->physics_s = hapi_config_seconds(cycle->config, interval_ns);
   }
-  physics->cycle.model = wanted;
-  physics->cycle.wishes = hapi_tape_wanted_effects(&physics->tape, &physics->wanted);
-  physics->cycle.probe_step_s = hapi_config_period(&physics->config, wanted);
+  cycle->probe_step_s = hapi_cycle_period(cycle, wanted);
+  cycle->step_s = cycle->step_scale * (cycle->step_s + lead_of(cycle) - lead_s);
+  if (cycle->step_s < 1e-9) {
+    cycle->step_s = 0.0;
+  }
+  cycle->steady = cycle->soft_s == hapi_cycle_test_s(cycle) && cycle->soft_s == cycle->probe_step_s;
+  cycle->wishes = hapi_tape_wanted_effects(&physics->tape, &physics->wanted);
 }
 
 /* ODE aborts the process on a pose that is not finite: nothing that makes one may reach it. */
@@ -95,8 +100,8 @@ static void step_part(hapi_physics *physics, double part_s)
   hapi_hold_let_go(&physics->account);
 }
 
-/* In parts of H, if that is wanted. Testing simulations have steps of H: contacts that are softer
- * for a part are made once more. */
+/* In parts of H, if that is wanted. Testing simulations have steps of the H as created: contacts
+ * that were softened for another step are made once more. */
 static void global_step(hapi_physics *physics)
 {
   hapi_cycle *cycle = &physics->cycle;
@@ -113,8 +118,10 @@ static void global_step(hapi_physics *physics)
     }
     step_part(physics, cycle->step_s / (double)parts);
   }
+  bool other = parts > 1 || cycle->soft_s != hapi_cycle_test_s(cycle);
   cycle->parts = 1;
-  if (parts > 1 && physics->world.notes->softened) {
+  cycle->soft_s = hapi_cycle_test_s(cycle);
+  if (other && physics->world.notes->softened) {
     hapi_world_collide(&physics->world, cycle, notes);
   }
 }
@@ -145,10 +152,10 @@ void hapi_physics_enter_dial(hapi_physics *physics)
   physics->counts.own.accuracy.iterations = physics->dial.iterations;
 }
 
-static void sync_in(hapi_physics *physics)
+static void sync_in(hapi_physics *physics, int64_t interval_ns)
 {
   hapi_physics_run_edits(physics);
-  follow_model(physics);
+  follow_model(physics, interval_ns);
   int percent[HAPI_DIALS];
   if (!hapi_tape_plays(physics->tape.tape)) {
     hapi_dial_follow(&physics->dial, &physics->cycle);
@@ -164,9 +171,7 @@ static void sync_in(hapi_physics *physics)
   hapi_physics_fill_settings(physics);
   /* The callbacks come where no list of bodies or geoms is in use: they may destroy some. */
   (void)call_step(physics, physics->world.ode.before_step);
-  if (hapi_physics_scan(physics, true) < HAP_OK) {
-    hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
-  }
+  hapi_physics_see(physics, true);
   int64_t begin_ns = hapi_clock_now();
   hapi_joints_scan(&physics->world);
   physics->counts.own.joints_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
@@ -223,10 +228,10 @@ void hapi_physics_test(hapi_physics *physics)
   }
 }
 
-/* It simulates in the hand's time alone. */
+/* It simulates in the hand's time alone, and with the step as created. */
 static bool may_look_back(const hapi_cycle *cycle)
 {
-  return cycle->time_scale == 1.0 && cycle->step_scale == 1.0;
+  return cycle->time_scale == 1.0 && cycle->step_scale == 1.0 && cycle->steady;
 }
 
 static void look_back(hapi_physics *physics, int64_t now_ns)
@@ -317,7 +322,7 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   /* Those of the last step: what looks at the bodies' joints has that many less to look at. */
   dJointGroupEmpty(physics->world.contact_group);
   seconds[0] = stopwatch_lap(&watch);
-  sync_in(physics);
+  sync_in(physics, next_ns - now_ns);
   if (!world_is_sound(physics)) {
     return;
   }
@@ -358,6 +363,7 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[4] += stopwatch_lap(&watch);
   note_times(physics, seconds, looked_s);
   if (call_step(physics, physics->world.ode.after_step)) {
+    hapi_physics_see(physics, false);
     hapi_physics_renew_model(physics);
   }
   hapi_physics_send_model(physics);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/log.h"
 #include "physics/physics_internal.h"
 
 /* What comes in at a cycle: the world's bodies and what the application says of them, its edits,
@@ -54,6 +55,13 @@ hap_status hapi_physics_scan(hapi_physics *physics, bool syncs)
   hap_status status = hapi_bodies_scan(&physics->world, &physics->cycle, syncs);
   pthread_mutex_unlock(&physics->drawing.lock);
   return status;
+}
+
+void hapi_physics_see(hapi_physics *physics, bool syncs)
+{
+  if (hapi_physics_scan(physics, syncs) < HAP_OK) {
+    hapi_log(HAP_LOG_ERROR, "no memory for the table of bodies: new bodies are not seen");
+  }
 }
 
 /* The local bodies once more: since the scan they may have been given what the loop made of

@@ -166,7 +166,10 @@ static void physics_prepare(hapi_physics *physics)
   hapi_cross_reset(&physics->cross);
   physics->cycle.model = (hap_model)atomic_load(&physics->wanted.model);
   physics->cycle.wishes = atomic_load(&physics->wanted.effects);
-  physics->cycle.probe_step_s = hapi_config_period(&physics->config, physics->cycle.model);
+  physics->cycle.physics_s = 1.0 / physics->config.physics_hz;
+  atomic_store(&physics->wanted.period_ns, llround(1e9 * physics->cycle.physics_s));
+  physics->cycle.probe_step_s = hapi_cycle_period(&physics->cycle, physics->cycle.model);
+  physics->cycle.soft_s = hapi_cycle_test_s(&physics->cycle);
   physics->cycle.state = NULL;
   physics->cycle.step_s = 0.0;
   physics->cycle.time_scale = (double)atomic_load(&physics->wanted.time_scale);
@@ -301,8 +304,12 @@ hap_status hapi_physics_lock(hapi_physics *physics, int64_t timeout_ns)
   return status;
 }
 
+/* What was made meanwhile can be drawn at once. */
 hap_status hapi_physics_unlock(hapi_physics *physics)
 {
+  if (physics->world.begun && hapi_physics_lock_is_mine(physics)) {
+    hapi_physics_see(physics, false);
+  }
   return hapi_lock_give(&physics->lock);
 }
 
@@ -313,12 +320,12 @@ int64_t hapi_physics_last_cycle(const hapi_physics *physics)
 
 double hapi_physics_period(const hapi_physics *physics)
 {
-  return hapi_config_period(&physics->config, physics->cycle.model);
+  return hapi_cycle_period(&physics->cycle, physics->cycle.model);
 }
 
 double hapi_physics_next_period(const hapi_physics *physics)
 {
-  return hapi_config_period(&physics->config, (hap_model)atomic_load(&physics->wanted.model));
+  return hapi_wanted_period(&physics->wanted, &physics->config);
 }
 
 void hapi_physics_set_tape(hapi_physics *physics, hapi_tape *tape)
@@ -353,6 +360,11 @@ void hapi_physics_set_effect(hapi_physics *physics, hap_effect effect, hap_effec
 void hapi_physics_set_time_scale(hapi_physics *physics, double scale)
 {
   atomic_store(&physics->wanted.time_scale, (float)scale);
+}
+
+void hapi_physics_set_period(hapi_physics *physics, int64_t period_ns)
+{
+  atomic_store(&physics->wanted.period_ns, period_ns);
 }
 
 uint32_t hapi_physics_wanted_effects(hapi_physics *physics)

@@ -72,14 +72,18 @@ hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody 
 hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const *bodies,
                                      size_t count);
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom);
-/* [any] At the time drawn for time_ns; newest of all. */
+#define HAPI_ALL_KNOWN SIZE_MAX
+
+/* [any] At the time drawn for time_ns; newest of all; roles. HAP_ERROR_NOT_FOUND: the body at
+ * *out_unknown is not known, perhaps others behind it; those that are known are told. */
 hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
-                              size_t count, hap_pose *out);
+                              size_t count, hap_pose *out, size_t *out_unknown);
 hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
-                                  hap_pose *out);
+                                  hap_pose *out, size_t *out_unknown);
 hap_status hapi_physics_roles(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
-                              hap_body_role *out);
-int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns); /* [any] */
+                              hap_body_role *out, size_t *out_unknown);
+/* [any] *out_step_ns: H. */
+int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns, int64_t *out_step_ns);
 
 /* session.h */
 void hapi_physics_set_model(hapi_physics *physics, hap_model model); /* [any] */
@@ -87,6 +91,8 @@ hap_model hapi_physics_wanted_model(hapi_physics *physics);          /* [any] */
 /* [any] From the next cycle on. */
 void hapi_physics_set_effect(hapi_physics *physics, hap_effect effect, hap_effect_wish wish);
 void hapi_physics_set_time_scale(hapi_physics *physics, double scale); /* [any] 0..1, likewise */
+void hapi_physics_set_period(hapi_physics *physics,
+                             int64_t period_ns);             /* [any] until the next start */
 uint32_t hapi_physics_wanted_effects(hapi_physics *physics); /* [any] as in base/wishes.h */
 /* [any] Its part of HAP_EFFECTS places. */
 void hapi_physics_effects(hapi_physics *physics, hap_effect_info *out);

@@ -88,6 +88,8 @@ void hapi_physics_enter_dial(hapi_physics *physics);
 void hapi_physics_listen(hapi_physics *physics); /* to the world, which is created after that */
 /* Reads which bodies there are. syncs: once in a cycle. */
 hap_status hapi_physics_scan(hapi_physics *physics, bool syncs);
+/* The same where there is nobody to tell: what fails is logged. */
+void hapi_physics_see(hapi_physics *physics, bool syncs);
 /* ODE would abort on what the world holds. *out_text says what it is and what to do. After a
  * scan. */
 bool hapi_physics_is_unsound(const hapi_physics *physics, hap_detail *out_text);

@@ -9,9 +9,9 @@
 
 /* Paces the cycles in drive THREADS. */
 
-static int64_t period_ns(const hapi_physics_config *config, hap_model model)
+static int64_t in_ns(double seconds)
 {
-  return (int64_t)llround(1e9 * hapi_config_period(config, model));
+  return (int64_t)llround(1e9 * seconds);
 }
 
 /* Where the next cycle belongs: at its deadline, or, when that has passed by whole periods, at the
@@ -32,7 +32,7 @@ static void *physics_main(void *arg)
 {
   hapi_physics *physics = arg;
   dAllocateODEDataForThread(dAllocateMaskAll);
-  int64_t period = period_ns(&physics->config, physics->cycle.model);
+  int64_t period = in_ns(hapi_physics_period(physics));
   int64_t deadline = physics->pace.start_ns;
   if (hapi_cycle_steps_to_now(&physics->cycle)) {
     deadline += period; /* the first model is for the start already */
@@ -41,10 +41,8 @@ static void *physics_main(void *arg)
     bool single = physics->cycle.model == HAP_MODEL_SINGLE;
     /* SINGLE works between two ticks: after the one before its time and before the one at it. */
     hapi_clock_sleep_until(single ? deadline - period / 2 : deadline);
-    hapi_physics_cycle(
-        physics, deadline,
-        deadline + period_ns(&physics->config, (hap_model)atomic_load(&physics->wanted.model)));
-    period = period_ns(&physics->config, physics->cycle.model);
+    hapi_physics_cycle(physics, deadline, deadline + in_ns(hapi_physics_next_period(physics)));
+    period = in_ns(hapi_physics_period(physics));
     deadline = skip_missed(physics, deadline + period, period);
   }
   dCleanupODEAllDataForThread();

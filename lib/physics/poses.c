@@ -24,11 +24,6 @@
 #define FRAMES_APART 0.25      /* H: frames of model SINGLE are kept no closer */
 #define TIME_LIMIT (1LL << 61) /* ns */
 
-static double step_ns(const hapi_physics_config *config)
-{
-  return 1e9 / config->physics_hz;
-}
-
 static double delay_at(const hapi_frames *frames, int64_t time_ns)
 {
   double since = time_ns > frames->delay_from_ns ? (double)(time_ns - frames->delay_from_ns) : 0.0;
@@ -44,7 +39,7 @@ static double delay_at(const hapi_frames *frames, int64_t time_ns)
 static uint64_t next_frame(hapi_frames *frames, const hapi_cycle *cycle, int64_t stamp_ns,
                            int64_t known_ns)
 {
-  double step = step_ns(cycle->config);
+  double step = frames->step_ns = 1e9 * cycle->physics_s;
   if (frames->count == 0) {
     frames->delay_ns = frames->delay_wanted_ns = step;
     frames->delay_from_ns = known_ns;
@@ -362,16 +357,25 @@ static hap_status scene_judge(const scene *d, double late_steps)
   return (double)(oldest_ns - d->time_ns) > slack ? HAP_CLAMPED : HAP_OK;
 }
 
-static bool all_known(const hapi_drawing *drawing, const hapi_body_table *table,
-                      struct dxBody *const *bodies, size_t count)
+/* NULL: there is nothing to draw of it yet. */
+static const hapi_drawn *drawn_of(const hapi_drawing *drawing, const hapi_body_table *table,
+                                  struct dxBody *body)
+{
+  uint32_t index = hapi_bodies_find(table, body);
+  bool known = index != HAPI_NONE && drawing->drawn[index].first < drawing->frames.count;
+  return known ? &drawing->drawn[index] : NULL;
+}
+
+/* HAPI_ALL_KNOWN, or the place of the first one that is not. */
+static size_t first_unknown(const hapi_drawing *drawing, const hapi_body_table *table,
+                            struct dxBody *const *bodies, size_t count)
 {
   for (size_t i = 0; i < count; ++i) {
-    uint32_t index = hapi_bodies_find(table, bodies[i]);
-    if (index == HAPI_NONE || drawing->drawn[index].first >= drawing->frames.count) {
-      return false;
+    if (drawn_of(drawing, table, bodies[i]) == NULL) {
+      return i;
     }
   }
-  return true;
+  return HAPI_ALL_KNOWN;
 }
 
 /* False: the trail went on so far meanwhile that what was read of it may be torn. */
@@ -386,7 +390,10 @@ static bool scene_draw_all(scene *d, const hapi_body_table *table, struct dxBody
   }
   d->row = hapi_trail_after(&d->rows, d->time_ns, HAPI_TRAIL_BODIES);
   for (size_t i = 0; i < count; ++i) {
-    scene_draw(d, &d->drawing->drawn[hapi_bodies_find(table, bodies[i])], &out[i]);
+    const hapi_drawn *drawn = drawn_of(d->drawing, table, bodies[i]);
+    if (drawn != NULL) {
+      scene_draw(d, drawn, &out[i]);
+    }
   }
   return hapi_trail_is_whole(&d->rows);
 }
@@ -395,18 +402,19 @@ static scene scene_begin(const hapi_physics *physics)
 {
   return (scene){.drawing = &physics->drawing,
                  .frames = &physics->drawing.frames,
-                 .step_ns = step_ns(&physics->config),
+                 .step_ns = physics->drawing.frames.step_ns,
                  .rows = hapi_trail_look(hapi_exchange_trail(physics->config.exchange))};
 }
 
 /* time_ns NULL: newest of all, where a frame may be two steps old. */
 static hap_status poses_draw(hapi_physics *physics, const int64_t *time_ns,
-                             struct dxBody *const *bodies, size_t count, hap_pose *out)
+                             struct dxBody *const *bodies, size_t count, hap_pose *out,
+                             size_t *out_unknown)
 {
   hap_status status = HAP_OK;
   pthread_mutex_lock(&physics->drawing.lock);
-  bool known = all_known(&physics->drawing, &physics->world.bodies, bodies, count);
-  for (bool whole = !known || count == 0; !whole;) {
+  *out_unknown = first_unknown(&physics->drawing, &physics->world.bodies, bodies, count);
+  for (bool whole = physics->drawing.frames.count == 0 || count == 0; !whole;) {
     scene d = scene_begin(physics);
     d.newest = time_ns == NULL;
     d.time_ns = time_ns != NULL ? drawn_time(d.frames, *time_ns)
@@ -417,38 +425,42 @@ static hap_status poses_draw(hapi_physics *physics, const int64_t *time_ns,
     status = scene_judge(&d, d.newest ? 2.0 : 1.0);
   }
   pthread_mutex_unlock(&physics->drawing.lock);
-  return known ? status : HAP_ERROR_NOT_FOUND;
+  return *out_unknown == HAPI_ALL_KNOWN ? status : HAP_ERROR_NOT_FOUND;
 }
 
 hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxBody *const *bodies,
-                              size_t count, hap_pose *out)
+                              size_t count, hap_pose *out, size_t *out_unknown)
 {
-  return poses_draw(physics, &time_ns, bodies, count, out);
+  return poses_draw(physics, &time_ns, bodies, count, out, out_unknown);
 }
 
 hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
-                                  hap_pose *out)
+                                  hap_pose *out, size_t *out_unknown)
 {
-  return poses_draw(physics, NULL, bodies, count, out);
+  return poses_draw(physics, NULL, bodies, count, out, out_unknown);
 }
 
 hap_status hapi_physics_roles(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
-                              hap_body_role *out)
+                              hap_body_role *out, size_t *out_unknown)
 {
   const hapi_body_table *table = &physics->world.bodies;
   pthread_mutex_lock(&physics->drawing.lock);
-  bool known = all_known(&physics->drawing, table, bodies, count);
-  for (size_t i = 0; known && i < count; ++i) {
-    out[i] = physics->drawing.drawn[hapi_bodies_find(table, bodies[i])].role;
+  *out_unknown = first_unknown(&physics->drawing, table, bodies, count);
+  for (size_t i = 0; i < count; ++i) {
+    const hapi_drawn *drawn = drawn_of(&physics->drawing, table, bodies[i]);
+    if (drawn != NULL) {
+      out[i] = drawn->role;
+    }
   }
   pthread_mutex_unlock(&physics->drawing.lock);
-  return known ? HAP_OK : HAP_ERROR_NOT_FOUND;
+  return *out_unknown == HAPI_ALL_KNOWN ? HAP_OK : HAP_ERROR_NOT_FOUND;
 }
 
-int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns)
+int64_t hapi_physics_drawn_time(hapi_physics *physics, int64_t time_ns, int64_t *out_step_ns)
 {
   pthread_mutex_lock(&physics->drawing.lock);
   int64_t time = drawn_time(&physics->drawing.frames, time_ns);
+  *out_step_ns = (int64_t)physics->drawing.frames.step_ns;
   pthread_mutex_unlock(&physics->drawing.lock);
   return time;
 }

@@ -35,6 +35,7 @@ typedef struct hapi_frames {
   double delay_ns; /* at delay_from_ns, on its way to delay_wanted_ns */
   double delay_wanted_ns;
   int64_t delay_from_ns;
+  double step_ns; /* H, at the newest frame */
 } hapi_frames;
 
 typedef struct hapi_drawing {

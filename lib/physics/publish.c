@@ -438,8 +438,8 @@ void hapi_physics_make_model(hapi_physics *physics, int64_t state_ns, int64_t va
   out->tick_work =
       hapi_room_work(physics->room.pace + physics->room.margin, physics->config.haptic_hz);
   out->sent_ns = hapi_tape_sent(&physics->tape, cycle);
-  out->period_s = hapi_config_period(
-      &physics->config, hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, true));
+  out->period_s = hapi_cycle_period(
+      cycle, hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, true));
   out->time_scale = cycle->time_scale;
   out->tick_budget_ns = hapi_dial_tick_budget(&physics->dial, physics->config.haptic_hz);
   hapi_model_body *bodies = hapi_model_bodies(out);

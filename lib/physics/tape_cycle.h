@@ -33,10 +33,20 @@ typedef struct hapi_taping {
 /* What other threads asked for, from the next cycle on. */
 typedef struct hapi_wanted {
   _Atomic int model;
-  _Atomic uint32_t effects; /* base/wishes.h */
-  _Atomic float time_scale; /* as a recording keeps it */
-  double latency_s;         /* negative: the model's own */
+  _Atomic uint32_t effects;  /* base/wishes.h */
+  _Atomic float time_scale;  /* as a recording keeps it */
+  _Atomic int64_t period_ns; /* of physics in other models than SINGLE */
+  double latency_s;          /* negative: the model's own */
 } hapi_wanted;
+
+/* s, from the next cycle to the one after it. */
+static inline double hapi_wanted_period(const hapi_wanted *wanted,
+                                        const hapi_physics_config *config)
+{
+  return atomic_load(&wanted->model) == HAP_MODEL_SINGLE
+             ? 1.0 / config->haptic_hz
+             : hapi_config_seconds(config, atomic_load(&wanted->period_ns));
+}
 
 /* All do nothing without a tape. A replay overwrites what is wanted. */
 /* Of a replay: HAP_ERROR_WORLD where the world is not the one of the recording. */

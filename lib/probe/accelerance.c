@@ -57,7 +57,7 @@ static hap_status contacts_gather(hapi_probe *probe)
 {
   hapi_pushed *pushed = &probe->contacts.pushed;
   pushed->count = 0;
-  hap_status status = hapi_test_begin(&probe->test, probe->world, probe->cycle->probe_step_s);
+  hap_status status = hapi_test_begin(&probe->test, probe->world, hapi_cycle_test_s(probe->cycle));
   for (uint32_t i = 0; i < probe->slots->contact_high && status >= HAP_OK; ++i) {
     const hapi_contact_slot *contact = &probe->slots->contacts[i];
     if (contact_moves_a_body(probe, contact)) {

@@ -156,7 +156,7 @@ static bool pair_begin(pair *p, hapi_probe *probe, hapi_known_joint *known)
   p->m = known->measurement;
   double scale = hapi_cycle_scale(probe->cycle);
   p->period = scale / config->haptic_hz;
-  p->ahead_s = 0.5 * scale * probe->cycle->probe_step_s;
+  p->ahead_s = 0.5 * scale * hapi_cycle_test_s(probe->cycle);
   p->ratio = hapi_tick_ratio(probe->cycle);
   bool second = known->bodies[0] == NULL || dBodyIsKinematic(known->bodies[0]);
   uint32_t first = second ? 1 : 0;
@@ -692,7 +692,7 @@ static void joint_measure(hapi_probe *probe, hapi_known_joint *known)
   if (same && pair_rests(p)) {
     return;
   }
-  if (hapi_test_begin(&probe->test, probe->world, probe->cycle->probe_step_s) < HAP_OK ||
+  if (hapi_test_begin(&probe->test, probe->world, hapi_cycle_test_s(probe->cycle)) < HAP_OK ||
       hapi_test_enter_pair(&probe->test, known->joint, p->index) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last rows of a joint stay");
     return;

@@ -75,7 +75,7 @@ static hap_status bodies_gather(hapi_probe *probe)
   hapi_test_set *test = &probe->test;
   hapi_pushed *pushed = &probe->bodies.pushed;
   pushed->count = 0;
-  hap_status status = hapi_test_begin(test, probe->world, probe->cycle->probe_step_s);
+  hap_status status = hapi_test_begin(test, probe->world, hapi_cycle_test_s(probe->cycle));
   for (uint32_t i = 0; i < probe->slots->body_high && status >= HAP_OK; ++i) {
     hapi_body_answer *answer = &probe->answers.bodies[i];
     if (probe->slots->bodies[i].phase != HAPI_SLOT_LIVE ||

@@ -25,6 +25,7 @@ static const hap_session_def session_defaults = {
     .max_pointers = 4,
     .rt_priority = 80,
     .accuracy = HAP_ACCURACY_DEFAULT,
+    .max_steps_per_update = 3,
 };
 
 static const hap_expert_def expert_defaults = {
@@ -119,6 +120,7 @@ static hap_status def_check(const hap_session_def *def, hap_detail *detail)
       HAPI_RULE(def, max_contacts, 1, 4096),
       HAPI_RULE(def, max_pointers, 1, HAP_TRACE_POINTERS_MAX),
       HAPI_RULE(def, rt_priority, 0, HAPI_THREAD_PRIORITY_MOST - 1),
+      HAPI_RULE(def, max_steps_per_update, 1, 64),
       HAPI_RULE(expert, trace_rows, 0, 1048576),
       HAPI_RULE(expert, max_hull_points, 0, 1048576),
       HAPI_RULE(expert, lookback, 0.0, 0.5),

@@ -4,14 +4,14 @@
 
 #include <math.h>
 
-hapi_frame_steps hapi_frame_take(double *remainder_s, double frame_s, double period, int64_t now_ns,
-                                 int64_t last_ns)
+hapi_frame_steps hapi_frame_take(double *remainder_s, double frame_s, double period, int most,
+                                 int64_t now_ns, int64_t last_ns)
 {
   hapi_frame_steps out = {0};
   double steps = floor((*remainder_s + frame_s) / period + 1e-9);
   double rest = *remainder_s + frame_s - steps * period;
   *remainder_s = rest > 0.0 && rest < period ? rest : 0.0;
-  double run = fmin(steps, HAPI_FRAME_STEPS_MOST);
+  double run = fmin(steps, most);
   out.count = (int)run;
   out.dropped = (uint64_t)(steps - run);
   if (out.count > 0) {

@@ -270,23 +270,43 @@ static hap_status update_check(hap_session *session, double frame_s)
   return HAP_OK;
 }
 
+static int64_t seconds_in_ns(double seconds)
+{
+  return (int64_t)llround(1e9 * seconds);
+}
+
+/* Runs the steps of one rate that fit, at most *io_most of them; true: none were dropped. now_ns:
+ * of the end of frame_s. */
+static bool run_frame_steps(hap_session *session, double frame_s, int64_t now_ns, int *io_most)
+{
+  double period = hapi_physics_period(session->physics);
+  double next_period = hapi_physics_next_period(session->physics);
+  hapi_frame_steps steps = hapi_frame_take(&session->frame_remainder_s, frame_s, period, *io_most,
+                                           now_ns, hapi_physics_last_cycle(session->physics));
+  for (int i = 0; i < steps.count; ++i) {
+    int64_t now = steps.first_ns + i * steps.apart_ns;
+    hapi_physics_cycle(session->physics, now, now + seconds_in_ns(next_period));
+  }
+  *io_most -= steps.count;
+  hapi_physics_count_dropped_frames(session->physics, steps.dropped);
+  return steps.dropped == 0;
+}
+
 hap_status hap_session_update(hap_session *session, double frame_s)
 {
   HAPI_TRY(update_check(session, frame_s));
   uint64_t lost = hapi_physics_bodies_lost(session->physics);
-  double period = hapi_physics_next_period(session->physics);
-  hapi_frame_steps steps =
-      hapi_frame_take(&session->frame_remainder_s, frame_s, period, hapi_clock_now(),
-                      hapi_physics_last_cycle(session->physics));
-  for (int i = 0; i < steps.count; ++i) {
-    int64_t now = steps.first_ns + i * steps.apart_ns;
-    hapi_physics_cycle(session->physics, now, now + (int64_t)llround(1e9 * period));
+  int64_t now_ns = hapi_clock_now();
+  int most = session->def.max_steps_per_update;
+  double rest_s = frame_s;
+  double period = hapi_physics_period(session->physics);
+  if (period != hapi_physics_next_period(session->physics)) { /* up to its end the old one holds */
+    double first_s = fmin(fmax(period - session->frame_remainder_s, 0.0), frame_s);
+    rest_s -= first_s;
+    (void)run_frame_steps(session, first_s, now_ns - seconds_in_ns(rest_s), &most);
   }
-  if (steps.dropped > 0) {
-    hapi_physics_count_dropped_frames(session->physics, steps.dropped);
-    return HAP_DROPPED;
-  }
-  return drive_outcome(session, lost);
+  return run_frame_steps(session, rest_s, now_ns, &most) ? drive_outcome(session, lost)
+                                                         : HAP_DROPPED;
 }
 
 /* Whole ones; signed on the way, as unsigned numbers are dear to convert. */
@@ -298,11 +318,6 @@ static uint64_t ticks_of(const hap_session *session, double period, uint64_t ste
 static int64_t time_of(const hap_session *session, uint64_t tick)
 {
   return hapi_clock_deadline(tick, session->def.haptic_hz);
-}
-
-static int64_t seconds_in_ns(double seconds)
-{
-  return (int64_t)llround(1e9 * seconds);
 }
 
 /* Runs the physics cycle of this tick when one is due. A change of model starts a new count. */
@@ -475,6 +490,21 @@ hap_status hap_session_set_time_scale(hap_session *session, double scale)
                              TIME_SCALE_LEAST);
   }
   hapi_physics_set_time_scale(session->physics, scale);
+  return HAP_OK;
+}
+
+hap_status hap_session_set_physics_hz(hap_session *session, double hz)
+{
+  HAPI_TRY(hapi_session_may_change(session));
+  double least = session->def.physics_hz / HAPI_RATE_FALL;
+  double most = fmin(session->def.haptic_hz, 1000.0);
+  if (!(hz >= least && hz <= most)) { /* NaN too */
+    return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
+                             "physics_hz is %g: %g to %g are possible here, from a quarter of the "
+                             "session's physics_hz on",
+                             hz, least, most);
+  }
+  hapi_physics_set_period(session->physics, seconds_in_ns(1.0 / hz));
   return HAP_OK;
 }
 

@@ -113,4 +113,6 @@ extern const hapi_def_type hapi_pointer_research_def_type;
 hap_status hapi_session_read_def(const hap_session_def *given, hap_session *out,
                                  hap_detail *detail);
 
+#define HAPI_RATE_FALL 4.0 /* how far below its rate at create physics may go while it runs */
+
 #endif

@@ -239,34 +239,52 @@ hap_status hap_session_set_moved_callback(hap_session *session, dBodyID body,
       session, hapi_physics_set_moved_callback(session->physics, body, callback), __func__);
 }
 
+/* Of a call for count bodies that returned status. */
+static hap_status say_who_is_unknown(hap_session *session, hap_status status, size_t unknown,
+                                     size_t count, const char *function)
+{
+  if (status != HAP_ERROR_NOT_FOUND) {
+    return hapi_session_say(session, status, function);
+  }
+  return hapi_session_fail(
+      session, status,
+      "%s: bodies[%zu] of %zu is not known to the session: it was destroyed or "
+      "forgotten, the session has not started, or it has neither geom nor "
+      "joint and was not adopted (hap_session_adopt_body)",
+      function, unknown, count);
+}
+
 hap_status hap_session_poses(hap_session *session, int64_t time_ns, const dBodyID *bodies,
                              size_t count, hap_pose *out)
 {
+  size_t unknown = 0;
   if (session == NULL || (count > 0 && (bodies == NULL || out == NULL))) {
     return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
-  return hapi_session_say(
-      session, hapi_physics_poses(session->physics, time_ns, bodies, count, out), __func__);
+  hap_status status = hapi_physics_poses(session->physics, time_ns, bodies, count, out, &unknown);
+  return say_who_is_unknown(session, status, unknown, count, __func__);
 }
 
 hap_status hap_session_poses_now(hap_session *session, const dBodyID *bodies, size_t count,
                                  hap_pose *out)
 {
+  size_t unknown = 0;
   if (session == NULL || (count > 0 && (bodies == NULL || out == NULL))) {
     return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
-  return hapi_session_say(session, hapi_physics_poses_now(session->physics, bodies, count, out),
-                          __func__);
+  hap_status status = hapi_physics_poses_now(session->physics, bodies, count, out, &unknown);
+  return say_who_is_unknown(session, status, unknown, count, __func__);
 }
 
 hap_status hap_session_roles(hap_session *session, const dBodyID *bodies, size_t count,
                              hap_body_role *out)
 {
+  size_t unknown = 0;
   if (session == NULL || (count > 0 && (bodies == NULL || out == NULL))) {
     return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
-  return hapi_session_say(session, hapi_physics_roles(session->physics, bodies, count, out),
-                          __func__);
+  hap_status status = hapi_physics_roles(session->physics, bodies, count, out, &unknown);
+  return say_who_is_unknown(session, status, unknown, count, __func__);
 }
 
 hap_status hap_session_trace_bodies(hap_session *session, const dBodyID *bodies, size_t count)

@@ -180,8 +180,8 @@ hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64
   if (session == NULL || (out_proxy == NULL && out_device == NULL)) {
     return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
-  int64_t drawn_ns = hapi_physics_drawn_time(session->physics, time_ns);
-  int64_t step_ns = (int64_t)(1e9 / session->def.physics_hz);
+  int64_t step_ns = 0;
+  int64_t drawn_ns = hapi_physics_drawn_time(session->physics, time_ns, &step_ns);
   hap_status status = hapi_haptic_pointer_poses(session->haptic, pointer, drawn_ns, step_ns, poses);
   if (status >= HAP_OK && out_proxy != NULL) {
     *out_proxy = poses[0];

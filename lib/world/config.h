@@ -64,10 +64,17 @@ typedef struct hapi_physics_config {
   void *user;
 } hapi_physics_config;
 
-/* s, from a cycle to the next: H, or T in model SINGLE. */
+/* s, from a cycle to the next: H as created, or T in model SINGLE. */
 static inline double hapi_config_period(const hapi_physics_config *config, hap_model model)
 {
   return 1.0 / (model == HAP_MODEL_SINGLE ? config->haptic_hz : config->physics_hz);
+}
+
+/* What a period of physics in nanoseconds stands for: that of the rate as created exactly. */
+static inline double hapi_config_seconds(const hapi_physics_config *config, int64_t period_ns)
+{
+  double created_s = 1.0 / config->physics_hz;
+  return period_ns == llround(1e9 * created_s) ? created_s : 1e-9 * (double)period_ns;
 }
 
 #endif

@@ -20,7 +20,10 @@ typedef struct hapi_cycle {
   hap_model model;
   uint32_t wishes;     /* effects, base/wishes.h */
   double step_s;       /* of this cycle's global step */
-  double probe_step_s; /* H */
+  double physics_s;    /* H in force: from a cycle to the next where the model is not SINGLE */
+  double probe_step_s; /* from this cycle to the next: H, or T in model SINGLE */
+  double soft_s;       /* of a step of the world, that its contacts and joints are softened for */
+  bool steady;         /* the step of this cycle and the next one are as created */
   double time_scale;   /* of the interval to come: what passes for bodies in a second of the hand */
   double step_scale;   /* the same of this cycle's step */
   uint64_t model_number;
@@ -34,6 +37,18 @@ typedef struct hapi_cycle {
 static inline bool hapi_cycle_steps_to_now(const hapi_cycle *cycle)
 {
   return cycle->model != HAP_MODEL_IMPULSE;
+}
+
+/* s, from a cycle of this model to the next. */
+static inline double hapi_cycle_period(const hapi_cycle *cycle, hap_model model)
+{
+  return model == HAP_MODEL_SINGLE ? 1.0 / cycle->config->haptic_hz : cycle->physics_s;
+}
+
+/* s, that the world's ERP and CFM are meant for: a step of a testing simulation. */
+static inline double hapi_cycle_test_s(const hapi_cycle *cycle)
+{
+  return hapi_config_period(cycle->config, cycle->model);
 }
 
 /* In a pause nothing is converted: no body moves. */

@@ -108,7 +108,8 @@ double hapi_tick_ratio(const hapi_cycle *cycle)
 
 double hapi_world_ratio(const hapi_cycle *cycle)
 {
-  double ratio = cycle->model == HAP_MODEL_SINGLE ? hapi_step_ratio(cycle) : 1.0;
+  double ratio = cycle->model == HAP_MODEL_SINGLE ? hapi_step_ratio(cycle)
+                                                  : cycle->soft_s / hapi_cycle_test_s(cycle);
   ratio /= cycle->parts > 1 ? (double)cycle->parts : 1.0;
   return cycle->step_scale > 0.0 ? ratio * cycle->step_scale : ratio;
 }
