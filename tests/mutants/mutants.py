@@ -36,6 +36,8 @@ WATCH_TESTS = ["emergency", "watchdog", "guard_session", "module", "faults_threa
 SPIDAR_TESTS = ["spidar_device", "spidar_errors", "spidar_frames", "spidar_emulator", "spidar",
                 "false_input", "spidar_the"]
 
+CONTACT_TESTS = ["haptic_rt", "contact_hard", "tool_bodies", "god_object", "coupling"]
+
 # Pattern of files: tests that should notice, the fast ones first.
 AREAS = [
     ("lib/device/emergency.c", WATCH_TESTS),
@@ -43,7 +45,8 @@ AREAS = [
     ("lib/haptic/standstill.c", WATCH_TESTS),
     ("lib/guard/*.c", GUARD_TESTS),
     ("lib/pointer/plausible.c", ["false_input", "faults", "late"]),
-    ("lib/base/safety.h", GUARD_TESTS + WATCH_TESTS + SPIDAR_TESTS + ["spidar_guard"]),
+    ("lib/base/safety.h", GUARD_TESTS + WATCH_TESTS + SPIDAR_TESTS + CONTACT_TESTS +
+     ["spidar_guard"]),
     ("plugins/spidar/guard.c", ["spidar_guard", "spidar"]),
     ("plugins/spidar/belief.c", ["spidar_device", "false_input", "spidar_emulator"]),
     ("plugins/spidar/serial.c", ["spidar_errors", "spidar", "spidar_emulator"]),
