@@ -333,10 +333,9 @@ static void fill_limit(const publishing *p, dJointID joint, parameter_fn get, in
   out->flags |= drives ? HAPI_LIMIT_MOTOR : 0u;
 }
 
-static void fill_parameters(const publishing *p, const hapi_known_joint *known,
+static void fill_parameters(const publishing *p, const hapi_known_joint *known, dJointID joint,
                             hapi_model_joint *out)
 {
-  dJointID joint = known->joint;
   dWorldID world = p->world->ode.world;
   const hapi_joint_traits *traits = hapi_joint_traits_of(joint);
   out->linear = softness_of(p, dWorldGetERP(world), dWorldGetCFM(world));
@@ -398,7 +397,7 @@ static void joint_fill(const publishing *p, const hapi_known_joint *known, hapi_
     return;
   }
   out->place = known->place;
-  fill_parameters(p, known, out);
+  fill_parameters(p, known, known->joint, out);
 }
 
 /* ---- the message ---- */
@@ -527,19 +526,40 @@ static dBodyID body_living(const publishing *p, uint32_t slot)
   return of != NULL && of->alive ? p->world->bodies.entries[of->known].body : NULL;
 }
 
-static bool joint_lives(const publishing *p, const hapi_model_joint *joint,
-                        const hapi_known_joint *known)
+/* Whether the body that a joint has is the known one at that address, and not a later one. */
+static bool body_is(const publishing *p, dBodyID body, const hapi_known_joint *known, int which)
+{
+  return body == known->bodies[which] &&
+         (body == NULL || (known->index[which] != HAPI_NONE &&
+                           !hapi_mark_is_gone(&p->world->bodies.entries[known->index[which]])));
+}
+
+/* ODE's own order: the world comes second. */
+static bool joint_is_kin(const publishing *p, dJointID joint, const hapi_known_joint *known)
+{
+  dBodyID a = dJointGetBody(joint, 0);
+  dBodyID b = dJointGetBody(joint, 1);
+  return dJointGetType(joint) == known->name.type && body_is(p, a != NULL ? a : b, known, 0) &&
+         body_is(p, a != NULL ? b : NULL, known, 1);
+}
+
+/* The joint that has the name now: one that was made in place of another has its name at any
+ * address. NULL: there is none, or its bodies are not known to live. */
+static dJointID joint_named(const publishing *p, const hapi_model_joint *joint,
+                            const hapi_known_joint *known)
 {
   const uint32_t slots[2] = {joint->body_a, joint->body_b};
   for (int i = 0; i < 2; ++i) {
     dBodyID body = body_living(p, slots[i]);
+    uint32_t older = 0;
     for (int k = body != NULL ? dBodyGetNumJoints(body) : 0; k > 0; --k) {
-      if (dBodyGetJoint(body, k - 1) == known->joint) {
-        return dJointGetType(known->joint) == known->name.type;
+      dJointID of = dBodyGetJoint(body, k - 1); /* the newest comes first */
+      if (joint_is_kin(p, of, known) && older++ == known->name.rank) {
+        return of;
       }
     }
   }
-  return false;
+  return NULL;
 }
 
 static void body_renew(const publishing *p, hapi_model *model, hapi_model_body *io)
@@ -583,9 +603,10 @@ void hapi_physics_renew_model(hapi_physics *physics)
     hapi_model_joint *joint = &hapi_model_joints(model)[i];
     const hapi_known_joint *known =
         &physics->world.joints.entries[physics->near.range.mechanism.joints[i]];
-    if (known->carried && joint_lives(&p, joint, known)) {
+    dJointID now = known->carried ? joint_named(&p, joint, known) : NULL;
+    if (now != NULL) {
       memset(joint->limits, 0, sizeof joint->limits);
-      fill_parameters(&p, known, joint);
+      fill_parameters(&p, known, now, joint);
     }
   }
 }
