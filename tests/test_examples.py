@@ -21,6 +21,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "try_device": "docs/devices.md",
     "edit_while_running": "docs/editing.md",
     "sound_on_touch": "docs/touches.md",
+    "walk_and_reach": "docs/pointers.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -125,6 +126,17 @@ def check_sound_on_touch(program):
           out)
     said = re.search(r"^at last on wood with ([0-9.]+) N, of which ([0-9.]+) N rub$", out, re.M)
     point(said is not None and 2.5 < float(said.group(1)) < 3.5, "the finger rests on it", out)
+
+
+def check_walk_and_reach(program):
+    out = run(program)
+    rows = rows_of(out, r"^hand at (-?[0-9.]+) (-?[0-9.]+) m, feels \S+ (-?[0-9.]+) (-?[0-9.]+) N$")
+    point(len(rows) == 12, "it prints every tenth frame", out)
+    point(len(rows) == 12 and float(rows[-1][1]) > 0.4, "the person walks on", out)
+    point(any(float(row[2]) < -0.2 and float(row[3]) > 2.0 for row in rows),
+          "the hand rubs on the table", out)
+    point(any(float(row[3]) == 0.0 for row in rows[7:10]), "with the clutch held there is no force",
+          out)
 
 
 def check_record_and_play(program):

@@ -5,6 +5,7 @@
 
 #include <hapode/expert.h>
 #include <hapode/pointer.h>
+#include <hapode/pointer_set.h>
 #include <hapode/research.h>
 
 /* A pointer's three structs of the API in one, as checked by lib/session. Recordings hold it: a
@@ -37,5 +38,21 @@ typedef struct hapi_pointer_setup {
   double virtual_mass;
   double virtual_inertia;
 } hapi_pointer_setup;
+
+/* Bits of a setting beside those of the API. */
+enum {
+  HAPI_SET_CLUTCH = 1 << 30
+};
+
+#define HAPI_SET_BITS 32
+
+/* What is set while a pointer runs: the fields of def that the mask names. Recordings hold it. */
+typedef struct hapi_pointer_setting {
+  hapi_pointer_setup def; /* device and hull_xyz NULL, no hull_points */
+  hap_twist twist_world_device;
+  int64_t base_time_ns; /* 0: of the tick that takes it */
+  uint32_t mask;        /* hap_pointer_set_bit, HAPI_SET_CLUTCH */
+  uint32_t clutched;
+} hapi_pointer_setting;
 
 #endif

@@ -45,6 +45,9 @@
 #define HAPI_SAFETY_RAMP_IN_S 0.02   /* s */
 #define HAPI_SAFETY_FADE_S 0.1       /* s */
 #define HAPI_SAFETY_AGE_LEAST_S 0.01 /* s */
+#define HAPI_SAFETY_SET_S 0.02       /* s */
+#define HAPI_SAFETY_LIMIT_S 0.1      /* s */
+#define HAPI_SAFETY_BASE_S 0.05      /* s */
 
 /* ---- late ticks ---- */
 #define HAPI_SAFETY_LATE_GAP_S 0.005     /* s */

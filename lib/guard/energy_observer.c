@@ -24,6 +24,8 @@
  *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the
  *            stiffness of a spring under load: the world's work, to either side. The energy in the
  *            spring of a contact that is no more is lost.
+ *   base     the motion of a device's frame in the world, and a stiffness that is set, are the
+ *            world's work: to either side.
  *   shares   of a hull's points in its stiffness are no entry: the hand pays for their changes,
  *            which it made by tilting the hull.
  *
@@ -166,10 +168,9 @@ static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *p
   return sum;
 }
 
-/* J in the spring of a contact that goes no farther than to the limit of the force. */
-static double spring_energy(const hapi_pointer *p, double share, double depth)
+/* J in the spring of a contact that goes no farther than to the limit of the force; k: N/m. */
+static double spring_energy(const hapi_pointer *p, double k, double depth)
 {
-  double k = share * p->surface.stiffness;
   double force = k * depth;
   if (!(depth > 0.0) || !(k > 0.0) || p->rigid) {
     return 0.0;
@@ -198,15 +199,20 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     const hapi_pointer *p = &pointers->of[c->pointer];
     hapi_ramp *r = &c->ramp;
     double share = c->hidden ? 0.0 : r->share * p->guard.felt;
-    double energy = spring_energy(p, c->weight * share, r->depth - r->excess);
+    double energy =
+        spring_energy(p, c->weight * share * p->surface.stiffness, r->depth - r->excess);
     double rubs = c->mu > 0.0 ? hapi_friction_energy(touches, tick, c) : 0.0;
     gone -= r->sprung;
-    if (share != r->felt_share || r->excess != r->felt_excess) { /* seldom */
+    if (share != r->felt_share || r->excess != r->felt_excess ||
+        p->surface.added != 0.0) { /* seldom */
       /* Over a jump the hand paid for no depth, so none of it is lost. */
       double excess = r->late || p->device.jumped ? r->excess : r->felt_excess;
-      sum += energy - spring_energy(p, c->weight * r->felt_share, r->depth - excess);
+      double before = p->surface.stiffness - p->surface.added;
+      sum += energy - spring_energy(p, c->weight * r->felt_share * before, r->depth - excess);
       sum +=
           (p->guard.felt - r->felt) * rubs; /* a deep contact's friction comes in with its limit */
+      sum += p->surface.stiffness > 0.0 ? r->felt * rubs * p->surface.added / p->surface.stiffness
+                                        : 0.0;
       r->felt_share = share;
       r->felt_excess = r->excess;
       r->felt = p->guard.felt;
@@ -265,6 +271,26 @@ static double port_gave(hapi_pointer *p, double seconds)
   return way > farthest ? hapi_max(gave, 0.0) * farthest / way : hapi_max(gave, 0.0);
 }
 
+/* J that the base's motion did on the springs since the last tick, against the mean of the forces
+ * on the hand before and after it. */
+static double base_gave(const hapi_pointer *p)
+{
+  const hapi_pointer_frame *f = &p->frame;
+  const double *turn = p->device.pose_world_device.quat_wxyz;
+  double force[3];
+  double torque[3];
+  if (!f->used || !(p->device.force_scale > 0.0)) {
+    return 0.0;
+  }
+  hapi_v3_add(p->guard.written.force, p->device.wrench.force, force);
+  hapi_v3_add(p->guard.written.torque, p->device.wrench.torque, torque);
+  hapi_quat_rotate(turn, force, force);
+  hapi_quat_rotate(turn, torque, torque);
+  return -0.5 *
+         (hapi_v3_dot(force, f->step) + p->device.motion_scale * hapi_v3_dot(torque, f->turned)) /
+         p->device.force_scale;
+}
+
 static bool is_any(const double v[3])
 {
   return v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0;
@@ -282,6 +308,7 @@ static bool settle_ports(hapi_guard *guard, const hapi_pointers *pointers, int64
       felt = felt || is_any(p->device.wrench.force) || is_any(p->guard.contact.force) ||
              is_any(p->guard.contact.torque);
       guard->balance -= port_gave(p, seconds);
+      guard->balance += base_gave(p);
     }
   }
   return felt;

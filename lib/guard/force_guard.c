@@ -116,7 +116,10 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
     return;
   }
   bool waits = g->share <= 0.0 && p->belief.doubted;
-  g->share = waits ? 0.0 : hapi_min(g->share + period / HAPI_SAFETY_RAMP_IN_S, 1.0);
+  double step = period / HAPI_SAFETY_RAMP_IN_S;
+  g->share = waits      ? 0.0
+             : g->fades ? hapi_max(g->share - step, 0.0)
+                        : hapi_min(g->share + step, 1.0);
   double share = g->share * (1.0 - guard->age_loss) * (1.0 - p->belief.loss) *
                  (1.0 - g->late_loss) * (1.0 - g->swings.taken);
   g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;

@@ -245,10 +245,14 @@ static bool pointer_swings(hapi_pointer *p, const hap_wrench *felt, const double
   bool turns = p->shape.hull != NULL && p->device.feels_torque;
   double stiffness = stiffness_felt(p);
   double arm2 = p->shape.extent * p->shape.extent; /* no contact has a longer one */
+  double way[3];                                   /* of the hand in its base */
+  double spin[3];
   s->seconds += seconds;
-  axes_hear(s, s->force, felt->force, p->handle.position, stiffness, seconds);
+  hapi_v3_sub(p->handle.position, p->frame.carried, way);
+  axes_hear(s, s->force, felt->force, way, stiffness, seconds);
   if (turns) {
-    hapi_v3_madd(s->turned, seconds, p->handle.spin, s->turned);
+    hapi_v3_sub(p->handle.spin, p->frame.carries.angular, spin);
+    hapi_v3_madd(s->turned, seconds, spin, s->turned);
     axes_hear(s, s->torque, felt->torque, s->turned,
               p->proxied ? p->coupling.spin_stiffness : arm2 * stiffness, seconds);
   }

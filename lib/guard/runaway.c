@@ -79,7 +79,9 @@ bool hapi_runaway_follow(hapi_runaway *runaway, const hapi_pointer *pointer, con
 {
   hapi_runaway *r = runaway;
   double newtons = hapi_v3_norm(force);
-  double against = newtons > 0.0 ? -hapi_v3_dot(force, pointer->handle.velocity) / newtons : 0.0;
+  double speed[3]; /* of the hand in its base */
+  hapi_v3_sub(pointer->handle.velocity, pointer->frame.carries.linear, speed);
+  double against = newtons > 0.0 ? -hapi_v3_dot(force, speed) / newtons : 0.0;
   bool other = pointer->contacts != r->contacts; /* what is touched has changed: nobody can tell */
   r->contacts = pointer->contacts;
   if (r->stage == RUNAWAY_ASKING && !other) {

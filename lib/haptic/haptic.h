@@ -70,6 +70,16 @@ hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, h
 void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out);
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                   const hap_twist *twist);
+/* [any] Changes what was set last by merge, which says what is wrong, and hands it to the loop.
+ * of: merge's. */
+typedef hap_status (*hapi_setting_merge)(const void *of, hapi_pointer_setting *io,
+                                         hap_detail *detail);
+/* The fields that the mask names. */
+void hapi_settings_copy(uint32_t mask, const hapi_pointer_setup *from, hapi_pointer_setup *to);
+hap_status hapi_haptic_set_pointer(hapi_haptic *haptic, hap_pointer_id id, hapi_setting_merge merge,
+                                   const void *of, hap_detail *detail);
+hap_status hapi_haptic_get_settings(hapi_haptic *haptic, hap_pointer_id id,
+                                    hapi_pointer_setting *out);
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out);
 bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id);
 /* [any] Pointer and device in the world at time_ns; HAP_STALE: later than the newest tick by more

@@ -37,6 +37,20 @@ typedef struct hapi_pointer_target {
   hap_twist twist;
 } hapi_pointer_target;
 
+/* Hand-over of what is set. Several settings between two ticks are one: each bit of the mask has
+ * the number of the setting that had it last. */
+typedef struct hapi_pointer_wishes {
+  hapi_pointer_setting value;
+  uint32_t numbers[HAPI_SET_BITS];
+} hapi_pointer_wishes;
+
+typedef struct hapi_pointer_settings_box {
+  hapi_triple_buffer buffer;
+  hapi_pointer_wishes places[3];
+  hapi_pointer_wishes newest;    /* of the application, under the slot's lock */
+  uint32_t taken[HAPI_SET_BITS]; /* of the loop */
+} hapi_pointer_settings_box;
+
 typedef struct hapi_pointer_slot {
   _Atomic int phase;
   _Atomic uint32_t generation; /* written while EMPTY */
@@ -53,6 +67,7 @@ typedef struct hapi_pointer_slot {
   hapi_pointer_target targets[3];
   hapi_triple_buffer state_buffer;
   hap_pointer_state states[3];
+  hapi_pointer_settings_box set;
 } hapi_pointer_slot;
 
 /* Published for the statistics; each written by the haptic thread alone. */
@@ -230,6 +245,7 @@ void hapi_tape_standstill(hapi_haptic *haptic, hapi_loop_standstill *io);
 void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches);
 void hapi_tape_join(hapi_haptic *haptic, uint32_t index);
 void hapi_tape_leave(hapi_haptic *haptic, uint32_t index, bool pauses);
+void hapi_tape_set(hapi_haptic *haptic, uint32_t index, const hapi_pointer_setting *setting);
 void hapi_tape_input(hapi_haptic *haptic, uint32_t index, hapi_pointer_input *io);
 void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *io);
 void hapi_tape_ticked(hapi_haptic *haptic);
@@ -237,6 +253,8 @@ void hapi_tape_ticked(hapi_haptic *haptic);
 bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pauses);
 bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out,
                          hap_device_info *out_info, hapi_tool_hull *out_hull);
+
+bool hapi_tape_next_set(hapi_haptic *haptic, uint32_t index, hapi_pointer_setting *out);
 
 /* loop_effects.c */
 void hapi_loop_effects_reset(hapi_haptic *haptic);
@@ -255,6 +273,14 @@ hap_status hapi_standstill_watch(hapi_haptic *haptic, uint32_t index);     /* st
 void hapi_standstill_take(hapi_haptic *haptic, hapi_loop_standstill *out); /* [haptic] */
 bool hapi_standstill_pending(const hapi_haptic *haptic);                   /* [any] */
 void hapi_standstill_stats(const hapi_haptic *haptic, hap_stats *io);      /* [any] */
+
+/* pointer_settings.c: what is set while a pointer runs */
+void hapi_settings_prepare(hapi_pointer_slot *slot); /* for a new user of the slot */
+void hapi_pointer_set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
+                               hapi_pointer *io);
+hapi_device_limits hapi_pointer_limits(const hapi_pointer_slot *slot);
+/* [haptic] What was set since, and a tick on the way there. */
+void hapi_settings_follow(hapi_haptic *haptic, uint32_t index, int64_t now_ns);
 
 /* pointers.c: what the loop does with the slots */
 void hapi_pointers_follow(hapi_haptic *haptic); /* phases */

@@ -13,55 +13,12 @@
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
 #include "pointer/coupling.h"
+#include "pointer/frame.h"
 #include "pointer/plausible.h"
 
-#define GRIP_MOST 0.05            /* m, at the device: arm that a handle has against turning */
-#define BALL_INERTIA 0.4          /* m r^2 */
 #define WORLD_STIFFNESS_MOST 1e15 /* N/m, of a proxy: beyond it rounding of positions is felt */
 
 /* ---- the loop's side ---- */
-
-/* In the world, where a metre of the device is motion_scale metres and a newton its share. */
-static void set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot, hapi_pointer *p)
-{
-  const hapi_pointer_setup *def = &slot->def;
-  hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.facts.period);
-  double scale = def->motion_scale * def->force_scale;
-  p->coupling.kind = def->coupling;
-  p->coupling.integration = def->integration;
-  if (def->coupling == HAP_COUPLING_GOD_OBJECT || def->coupling == HAP_COUPLING_VIRTUAL) {
-    p->coupling.integration = HAP_INTEGRATION_IMPLICIT; /* there is no spring of a contact */
-  }
-  p->coupling.hold_known = gains.known && scale > 0.0;
-  p->coupling.hold = p->coupling.hold_known ? gains.stiffness / scale : HUGE_VAL;
-  p->coupling.stiffness = p->coupling.hold_known ? p->coupling.hold : 0.0;
-  p->coupling.damping = p->coupling.hold_known ? gains.damping / scale : 0.0;
-  p->coupling.mass = def->coupling == HAP_COUPLING_GOD_OBJECT ? 0.0
-                     : def->coupling == HAP_COUPLING_VIRTUAL  ? def->virtual_mass
-                                                              : def->proxy_mass;
-  p->coupling.reason = def->coupling == HAP_COUPLING_AUTO ? HAP_COUPLING_MODEL : HAP_COUPLING_ASKED;
-}
-
-/* A proxy turns as if it were held at its vertices: by the square of their arm. Not of a long
- * tool's: the device's grip is not as long. */
-static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_pointer *p)
-{
-  const hapi_tool_hull *hull = &slot->hull;
-  double sum = 0.0;
-  for (uint32_t i = 0; i < hull->count; ++i) {
-    sum += hapi_v3_dot(hull->points[i], hull->points[i]) / hull->count;
-  }
-  double reach = sqrt(sum) + slot->def.radius;
-  double arm = fmin(reach, GRIP_MOST * slot->def.motion_scale);
-  p->coupling.spin_stiffness = arm * arm * p->coupling.stiffness;
-  p->coupling.spin_damping = arm * arm * p->coupling.damping;
-  p->coupling.inertia = arm * arm * p->coupling.mass;
-  if (slot->def.coupling == HAP_COUPLING_VIRTUAL) {
-    p->coupling.inertia = slot->def.virtual_inertia > 0.0
-                              ? slot->def.virtual_inertia
-                              : BALL_INERTIA * reach * reach * p->coupling.mass;
-  }
-}
 
 static void pointer_activate(hapi_haptic *haptic, uint32_t index)
 {
@@ -98,22 +55,14 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   p->device.pose_world_device = def->pose_world_device;
   const double *turn = def->pose_world_device.quat_wxyz;
   p->device.aligned = turn[0] == 1.0 && turn[1] == 0.0 && turn[2] == 0.0 && turn[3] == 0.0;
-  p->device.limits.max_force =
-      info->max_force > 0.0 && info->max_force < def->max_force ? info->max_force : def->max_force;
-  p->device.limits.max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque
-                                    ? info->max_torque
-                                    : def->max_torque;
+  p->device.limits = hapi_pointer_limits(slot);
   p->device.estimates =
       def->velocity == HAP_VELOCITY_ESTIMATED ||
       (def->velocity == HAP_VELOCITY_AUTO && info->quantum > 0.0 && info->measures_velocity == 0);
   p->device.speed_limit = slot->has_device ? HAPI_SAFETY_SPEED_LIMIT : 0.0;
   hapi_velocity_reset(&p->velocity, info->quantum);
-  set_coupling(haptic, slot, p);
-  set_spin_coupling(slot, p);
-  p->device.limits.slew_force =
-      def->max_slew > 0.0 ? def->max_slew : p->device.limits.max_force / HAPI_SAFETY_SLEW_S;
-  p->device.limits.slew_torque =
-      p->device.limits.max_torque * (p->device.limits.slew_force / p->device.limits.max_force);
+  hapi_pointer_set_coupling(haptic, slot, p);
+  hapi_frame_init(p, &def->pose_world_device);
   p->device.pose.quat_wxyz[0] = 1.0;
   p->device.good.quat_wxyz[0] = 1.0;
   p->handle.quat[0] = p->proxy.quat[0] = 1.0;
@@ -135,6 +84,7 @@ static void slot_prepare(hapi_pointer_slot *slot)
     slot->states[i].proxy.quat_wxyz[0] = 1.0;
     slot->states[i].size = sizeof slot->states[i];
   }
+  hapi_settings_prepare(slot);
   pthread_mutex_unlock(&slot->lock);
 }
 
@@ -237,6 +187,9 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     hapi_pointer *p = &haptic->tick.pointers.of[i];
     if (p->generation == 0) {
       continue;
+    }
+    if (p->glides.any || hapi_triple_is_fresh(&slot->set.buffer) || hapi_tape_plays(haptic->tape)) {
+      hapi_settings_follow(haptic, i, now_ns);
     }
     hapi_pointer_input in = {.pose = p->device.pose};
     if (!hapi_tape_plays(haptic->tape)) {
@@ -464,9 +417,8 @@ static void fill_slot(hapi_pointer_slot *slot, const hapi_pointer_setup *def)
 }
 
 static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
-                                 hap_detail *detail)
+                                 const hapi_pointer_setup *def, hap_detail *detail)
 {
-  const hapi_pointer_setup *def = &slot->def;
   const char *name = hap_coupling_name(def->coupling);
   if (!hapi_coupling_has_spring(def->coupling)) {
     return HAP_OK;
@@ -506,7 +458,7 @@ hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hapi_pointer_setup
   }
   hapi_pointer_slot *slot = &haptic->slots[index];
   fill_slot(slot, def);
-  hap_status status = check_coupling(haptic, slot, detail);
+  hap_status status = check_coupling(haptic, slot, &slot->def, detail);
   if (status >= HAP_OK && haptic->begun) {
     status = start_device(haptic, slot, detail);
   }
@@ -616,6 +568,43 @@ hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const 
   }
   pthread_mutex_unlock(&slot->lock);
   return free ? HAP_OK : HAP_ERROR_STATE;
+}
+
+hap_status hapi_haptic_set_pointer(hapi_haptic *haptic, hap_pointer_id id, hapi_setting_merge merge,
+                                   const void *of, hap_detail *detail)
+{
+  hapi_pointer_slot *slot = slot_lock(haptic, id);
+  if (slot == NULL) {
+    return HAP_ERROR_NOT_FOUND;
+  }
+  hapi_pointer_wishes *newest = &slot->set.newest;
+  hapi_pointer_setting value = newest->value;
+  hap_status status = merge(of, &value, detail);
+  if (status >= HAP_OK) {
+    status = check_coupling(haptic, slot, &value.def, detail);
+  }
+  if (status >= HAP_OK) {
+    newest->value = value;
+    for (int i = 0; i < HAPI_SET_BITS; ++i) {
+      newest->numbers[i] += value.mask >> i & 1u;
+    }
+    slot->set.places[hapi_triple_back(&slot->set.buffer)] = *newest;
+    hapi_triple_publish(&slot->set.buffer);
+  }
+  pthread_mutex_unlock(&slot->lock);
+  return status;
+}
+
+hap_status hapi_haptic_get_settings(hapi_haptic *haptic, hap_pointer_id id,
+                                    hapi_pointer_setting *out)
+{
+  hapi_pointer_slot *slot = slot_lock(haptic, id);
+  if (slot == NULL) {
+    return HAP_ERROR_NOT_FOUND;
+  }
+  *out = slot->set.newest.value;
+  pthread_mutex_unlock(&slot->lock);
+  return HAP_OK;
 }
 
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out)

@@ -111,14 +111,29 @@ static void hull_move(hapi_tape *tape, uint32_t index, hapi_tool_hull *io)
   }
 }
 
+/* A struct in several cells of one kind; bytes: as many as they have. */
+static void cells_move(hapi_tape *tape, hapi_cell_kind kind, uint32_t index, char *bytes,
+                       uint32_t count)
+{
+  for (uint32_t i = 0; i < count; ++i) {
+    hapi_tape_move(tape, hapi_tape_next(tape, kind, index)->d, bytes + i * HAPI_CELL_BYTES,
+                   HAPI_CELL_BYTES);
+  }
+}
+
 static void joined_move(hapi_tape *tape, uint32_t index, hapi_joined *io)
 {
   char bytes[HAPI_JOIN_CELLS * HAPI_CELL_BYTES] = {0};
   memcpy(bytes, io, sizeof *io);
-  for (uint32_t i = 0; i < HAPI_JOIN_CELLS; ++i) {
-    hapi_tape_move(tape, hapi_tape_next(tape, HAPI_CELL_JOIN, index)->d,
-                   bytes + i * HAPI_CELL_BYTES, HAPI_CELL_BYTES);
-  }
+  cells_move(tape, HAPI_CELL_JOIN, index, bytes, HAPI_JOIN_CELLS);
+  memcpy(io, bytes, sizeof *io);
+}
+
+static void setting_move(hapi_tape *tape, uint32_t index, hapi_pointer_setting *io)
+{
+  char bytes[HAPI_SET_CELLS * HAPI_CELL_BYTES] = {0};
+  memcpy(bytes, io, sizeof *io);
+  cells_move(tape, HAPI_CELL_SET, index, bytes, HAPI_SET_CELLS);
   memcpy(io, bytes, sizeof *io);
 }
 
@@ -200,6 +215,26 @@ bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *
   out_hull->count = points <= HAPI_TOOL_POINTS_MAX ? points : 0;
   hull_move(tape, *out_index, out_hull);
   return !tape->broken && *out_index < haptic->config.capacity.pointers;
+}
+
+void hapi_tape_set(hapi_haptic *haptic, uint32_t index, const hapi_pointer_setting *setting)
+{
+  if (hapi_tape_records(haptic->tape)) {
+    hapi_pointer_setting copy = *setting;
+    setting_move(haptic->tape, index, &copy);
+  }
+}
+
+bool hapi_tape_next_set(hapi_haptic *haptic, uint32_t index, hapi_pointer_setting *out)
+{
+  hapi_tape *tape = haptic->tape;
+  if (!hapi_tape_next_is(tape, HAPI_CELL_SET) ||
+      tape->packet_cells[tape->packet_at].index != index) {
+    return false;
+  }
+  memset(out, 0, sizeof *out);
+  setting_move(tape, index, out);
+  return !tape->broken;
 }
 
 /* ---- devices ---- */

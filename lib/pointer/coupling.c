@@ -5,6 +5,7 @@
 #include "base/plausible.h"
 #include "base/safety.h"
 #include "base/vec.h"
+#include "pointer/frame.h"
 #include "pointer/proxy.h"
 
 /* Between device and world. The pointer is where the device is (paper section 3), unless it is a
@@ -62,6 +63,18 @@ static void pointer_place_turn(hapi_pointer *p)
   }
   memcpy(p->handle.quat, p->pose.quat_wxyz, sizeof p->handle.quat);
   hapi_v3_copy(p->twist.angular, p->handle.spin);
+}
+
+/* A frame that leaps takes the pointer with it as a jump of the device does. */
+static bool pointer_place_in_frame(hapi_pointer *p, int64_t now_ns, double elapsed)
+{
+  if (!hapi_frame_place(p, now_ns, elapsed)) {
+    return false;
+  }
+  p->device.jumped = p->device.jumped || p->frame.leapt;
+  p->device.good = p->device.pose;
+  p->device.placed = true;
+  return true;
 }
 
 /* False: the frame and the scale take it out of the world. */
@@ -149,8 +162,8 @@ static void declared_begin(hapi_pointer *p, const hapi_pointer_handle *before, d
   hapi_declared_begin(&p->declared, way, turn);
 }
 
-uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double elapsed,
-                            double physics_period)
+uint32_t hapi_coupling_read(const hapi_pointers *pointers, int64_t now_ns, double period,
+                            double elapsed, double physics_period)
 {
   double stood = elapsed - period > HAPI_SAFETY_LATE_GAP_S ? 1.0 - period / elapsed : 0.0;
   uint32_t unusable = 0;
@@ -161,16 +174,16 @@ uint32_t hapi_coupling_read(const hapi_pointers *pointers, double period, double
     }
     bool good = input_is_plausible(p);
     p->device.stood = p->device.placed ? stood : 0.0;
-    p->device.jumped = good && pointer_jumps(p, period);
-    p->device.jump_s =
-        p->device.jumped ? HAPI_SAFETY_JUMP_S + 2.0 * physics_period : p->device.jump_s - period;
+    p->device.jumped = good && !p->frame.clutched && pointer_jumps(p, period);
     pointer_check_speed(p);
     const hapi_pointer_handle before = p->handle;
-    bool placed = good && pointer_place(p);
+    good = good && (p->frame.used ? pointer_place_in_frame(p, now_ns, elapsed) : pointer_place(p));
+    p->device.jump_s =
+        p->device.jumped ? HAPI_SAFETY_JUMP_S + 2.0 * physics_period : p->device.jump_s - period;
     if (p->declared.any || p->declared.was) {
       declared_begin(p, &before, elapsed);
     }
-    if (!placed) {
+    if (!good) {
       unusable = unusable == 0 ? i + 1 : unusable;
     } else if (p->device.jumped) {
       hapi_proxy_begin_anew(p);

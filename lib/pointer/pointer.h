@@ -30,6 +30,7 @@ typedef struct hapi_pointer_surface {
   double damping;
   double friction;
   double finger_radius; /* m, of the torsion; 0: none */
+  double added;         /* N/m, that a setting has added to the stiffness in this tick */
 } hapi_pointer_surface;
 
 /* At the device. */
@@ -117,6 +118,56 @@ typedef struct hapi_pointer_coupling {
   double contact_stiffness; /* N/m, the same of the last tick, whole */
 } hapi_pointer_coupling;
 
+/* Where the device's frame is in the world at time_ns, and how it goes on from there. */
+typedef struct hapi_frame_base {
+  hap_pose pose;
+  hap_twist twist;
+  int64_t time_ns;
+} hapi_frame_base;
+
+/* How the device's frame lies and moves, see frame.c. */
+typedef struct hapi_pointer_frame {
+  bool used; /* else it stands, as pose_world_device */
+  bool clutched;
+  bool rebased; /* since the last placing */
+  bool leaps;   /* likewise: by no motion */
+  bool leapt;   /* in this tick */
+  bool stands;  /* a new scale is about where the pointer is */
+  hapi_frame_base base;
+  double scale_before; /* of the last placing, where it is another one now; else 0 */
+  double index[3];     /* m, device frame */
+  double index_turn[4];
+  hap_pose seen;      /* device less the index, at the last placing */
+  hap_pose last;      /* device, likewise */
+  double lag[3];      /* m */
+  double lag_turn[3]; /* 2 sin(angle / 2) along the axis */
+  double lag_s;       /* s, until it has ended */
+  hap_twist carries;  /* share of the handle's velocity that is not the hand's */
+  double step[3];     /* m, likewise of its way in this tick */
+  double turned[3];   /* rad */
+  double carried[3];  /* m, sum of the steps, also of leaps */
+} hapi_pointer_frame;
+
+/* A number on its way to another one. */
+typedef struct hapi_glide {
+  double to;
+  double left_s; /* 0: it is there */
+} hapi_glide;
+
+/* What was set, and is not there yet, see lib/haptic/pointer_settings.c. */
+typedef struct hapi_pointer_glides {
+  bool any;
+  bool limits;
+  bool stands; /* while the scale changes the pointer does not move */
+  hapi_glide motion_scale;
+  hapi_glide force_scale;
+  hapi_glide stiffness;
+  hapi_glide damping;
+  hapi_glide friction;
+  hapi_glide finger_radius;
+  hapi_device_limits wanted;
+} hapi_pointer_glides;
+
 /* Where the device is in the world. */
 typedef struct hapi_pointer_handle {
   double position[3];
@@ -155,6 +206,7 @@ typedef struct hapi_rigid_move {
 /* What the guard keeps of a pointer. Device frame and units where nothing else is said; zeroed: a
  * pointer that has just come. */
 typedef struct hapi_guard_pointer {
+  bool fades;         /* the ramp goes down: the clutch is held */
   double share;       /* 0..1, of the ramp-in */
   double late_loss;   /* 0..1, share of the force that late ticks have taken */
   bool placed;        /* position and moved are of the device as it is now */
@@ -192,6 +244,8 @@ typedef struct hapi_pointer {
   hapi_guard_pointer guard;
   hapi_velocity velocity;
   hapi_pointer_belief belief;
+  hapi_pointer_frame frame;
+  hapi_pointer_glides glides;
 } hapi_pointer;
 
 typedef struct hapi_pointers {

@@ -6,6 +6,7 @@
 #include <hapode/accuracy.h>
 #include <hapode/expert.h>
 #include <hapode/pointer.h>
+#include <hapode/pointer_set.h>
 #include <hapode/research.h>
 
 #include "base/log.h"
@@ -68,6 +69,17 @@ static const hap_pointer_research_def pointer_research_defaults = {
     .virtual_mass = 0.1,
 };
 
+/* As pointer_defaults. */
+static const hap_pointer_settings pointer_settings_defaults = {
+    .cookie = 0x48505332u,
+    .pose_world_device = {.quat_wxyz = {1.0}},
+    .motion_scale = 1.0,
+    .force_scale = 1.0,
+    .stiffness = 1000.0,
+    .max_force = 20.0,
+    .max_torque = 1.0,
+};
+
 const hapi_def_type hapi_session_def_type = HAPI_DEF_TYPE(hap_session_def, session_defaults);
 const hapi_def_type hapi_expert_def_type = HAPI_DEF_TYPE(hap_expert_def, expert_defaults);
 const hapi_def_type hapi_research_def_type = HAPI_DEF_TYPE(hap_research_def, research_defaults);
@@ -76,6 +88,8 @@ const hapi_def_type hapi_pointer_expert_def_type =
     HAPI_DEF_TYPE(hap_pointer_expert_def, pointer_expert_defaults);
 const hapi_def_type hapi_pointer_research_def_type =
     HAPI_DEF_TYPE(hap_pointer_research_def, pointer_research_defaults);
+const hapi_def_type hapi_pointer_settings_type =
+    HAPI_DEF_TYPE(hap_pointer_settings, pointer_settings_defaults);
 
 void hap_session_def_init(hap_session_def *def, size_t size_of_def)
 {
@@ -105,6 +119,11 @@ void hap_pointer_expert_def_init(hap_pointer_expert_def *def, size_t size_of_def
 void hap_pointer_research_def_init(hap_pointer_research_def *def, size_t size_of_def)
 {
   hapi_def_init(&hapi_pointer_research_def_type, def, size_of_def);
+}
+
+void hap_pointer_settings_init(hap_pointer_settings *settings, size_t size_of_settings)
+{
+  hapi_def_init(&hapi_pointer_settings_type, settings, size_of_settings);
 }
 
 static hap_status def_check(const hap_session_def *def, hap_detail *detail)

@@ -87,9 +87,14 @@ hap_status hapi_play_advance(hap_session *session, uint64_t ticks);
 
 /* session_pointer.c; detail may be NULL */
 /* The structs of the API in one, checked. */
+/* The text for a status without one. */
+hap_status hapi_session_say_why_not(const hap_session *session, hap_pointer_id pointer,
+                                    hap_status status);
 hap_status hapi_session_read_pointer(const hap_pointer_def *given, hapi_pointer_setup *out,
                                      hap_detail *detail);
 hap_status hapi_session_check_pointer(const hapi_pointer_setup *def, hap_detail *detail);
+/* What is set while a pointer runs: a fault in any field, also in those that are not set. */
+hap_status hapi_session_check_setting(const hapi_pointer_setting *setting, hap_detail *detail);
 hap_status hapi_session_check_hull(const hapi_pointer_setup *def, hap_detail *detail);
 
 /* session_accuracy.c: what turns the dial */
@@ -108,6 +113,7 @@ extern const hapi_def_type hapi_research_def_type;
 extern const hapi_def_type hapi_pointer_def_type;
 extern const hapi_def_type hapi_pointer_expert_def_type;
 extern const hapi_def_type hapi_pointer_research_def_type;
+extern const hapi_def_type hapi_pointer_settings_type;
 /* Fills in def, expert and research of *out, and checks them. given NULL: defaults. def.expert and
  * def.research are never NULL then. */
 hap_status hapi_session_read_def(const hap_session_def *given, hap_session *out,

@@ -295,6 +295,32 @@ static hap_status check_join(const hap_player *player, const hapi_cell *cells, u
   return HAP_OK;
 }
 
+static hap_status check_set(const hap_player *player, const hapi_cell *cells, hap_detail *detail)
+{
+  char bytes[HAPI_SET_CELLS * HAPI_CELL_BYTES];
+  hapi_pointer_setting setting;
+  for (uint32_t i = 0; i < HAPI_SET_CELLS; ++i) {
+    memcpy(bytes + i * HAPI_CELL_BYTES, cells[i].d, HAPI_CELL_BYTES);
+  }
+  memcpy(&setting, bytes, sizeof setting);
+  bool good = cells[0].index < player->session->def.max_pointers &&
+              setting.def.cookie == HAPI_POINTER_COOKIE && setting.def.device == NULL &&
+              setting.def.hull_xyz == NULL && setting.def.hull_points == 0 &&
+              hapi_session_check_setting(&setting, NULL) >= HAP_OK;
+  return good ? HAP_OK : play_contradicts(player, "a setting that there cannot be", detail);
+}
+
+/* Of several cells of one kind, which are of one pointer: whether all are there. */
+static bool has_cells(const hapi_cell *cells, uint32_t count, uint32_t wanted)
+{
+  for (uint32_t i = 0; i < wanted; ++i) {
+    if (i >= count || cells[i].kind != cells[0].kind || cells[i].index != cells[0].index) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /* What the loop would not have from devices. */
 static hap_status check_packet(const hap_player *player, const hapi_cell *cells, uint32_t count,
                                hap_detail *detail)
@@ -312,6 +338,11 @@ static hap_status check_packet(const hap_player *player, const hapi_cell *cells,
                    ? check_join(player, &cells[i], count - i, detail)
                    : play_contradicts(player, "a pointer comes in part", detail));
       i += HAPI_JOIN_CELLS - 1;
+    } else if (cells[i].kind == HAPI_CELL_SET) {
+      HAPI_TRY(has_cells(&cells[i], count - i, HAPI_SET_CELLS)
+                   ? check_set(player, &cells[i], detail)
+                   : play_contradicts(player, "a setting comes in part", detail));
+      i += HAPI_SET_CELLS - 1;
     }
   }
   return HAP_OK;

@@ -122,7 +122,8 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
   return hapi_session_note(session, status, &detail);
 }
 
-static hap_status say_why_not(const hap_session *session, hap_pointer_id pointer, hap_status status)
+hap_status hapi_session_say_why_not(const hap_session *session, hap_pointer_id pointer,
+                                    hap_status status)
 {
   if (status == HAP_ERROR_NOT_FOUND) {
     return hapi_session_fail(session, status,
@@ -141,7 +142,8 @@ static hap_status say_why_not(const hap_session *session, hap_pointer_id pointer
 hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer)
 {
   HAPI_TRY(hapi_session_may_change(session));
-  return say_why_not(session, pointer, hapi_haptic_remove_pointer(session->haptic, pointer));
+  return hapi_session_say_why_not(session, pointer,
+                                  hapi_haptic_remove_pointer(session->haptic, pointer));
 }
 
 hap_status hap_pointer_restart(hap_session *session, hap_pointer_id pointer)
@@ -169,8 +171,8 @@ hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
                              "the target's twist is not finite or beyond 1e6 m/s or rad/s; the "
                              "pointer stays where it was");
   }
-  return say_why_not(session, pointer,
-                     hapi_haptic_set_target(session->haptic, pointer, pose, twist));
+  return hapi_session_say_why_not(session, pointer,
+                                  hapi_haptic_set_target(session->haptic, pointer, pose, twist));
 }
 
 hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64_t time_ns,
@@ -189,7 +191,7 @@ hap_status hap_pointer_poses(hap_session *session, hap_pointer_id pointer, int64
   if (status >= HAP_OK && out_device != NULL) {
     *out_device = poses[1];
   }
-  return say_why_not(session, pointer, status);
+  return hapi_session_say_why_not(session, pointer, status);
 }
 
 hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
@@ -199,8 +201,8 @@ hap_status hap_pointer_get(const hap_session *session, hap_pointer_id pointer,
   if (session == NULL) {
     return HAP_ERROR_ARGUMENT;
   }
-  HAPI_TRY(
-      say_why_not(session, pointer, hapi_haptic_get_pointer(session->haptic, pointer, &state)));
+  HAPI_TRY(hapi_session_say_why_not(session, pointer,
+                                    hapi_haptic_get_pointer(session->haptic, pointer, &state)));
   return hapi_session_say(session, hapi_struct_give(&state, sizeof state, out, size_of_out),
                           __func__);
 }

@@ -115,8 +115,8 @@ void hapi_tick_read(hapi_tick *tick, int64_t now_ns)
   double since = facts->tick > 0 ? 1e-9 * (double)(now_ns - facts->read_ns) : 0.0;
   facts->elapsed = hapi_max(since, facts->period);
   facts->now_ns = facts->read_ns = now_ns;
-  uint32_t unusable =
-      hapi_coupling_read(&tick->pointers, facts->period, facts->elapsed, facts->physics_period);
+  uint32_t unusable = hapi_coupling_read(&tick->pointers, now_ns, facts->period, facts->elapsed,
+                                         facts->physics_period);
   if (unusable > 0) {
     hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, unusable);
   }

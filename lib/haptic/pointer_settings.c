@@ -1,0 +1,272 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include <math.h>
+#include <string.h>
+
+#include "base/safety.h"
+#include "base/vec.h"
+#include "haptic/coupling_gains.h"
+#include "haptic/haptic_internal.h"
+#include "pointer/frame.h"
+
+/* What is set while a pointer runs. Applications hand it over by a triple buffer; a tick takes it,
+ * writes it into the slot's def, and brings the pointer there: at once where nothing would leap,
+ * else in the next 20 ms. What a tick takes is an input and goes on the tape. */
+
+#define GRIP_MOST 0.05   /* m, at the device: arm that a handle has against turning */
+#define BALL_INERTIA 0.4 /* m r^2 */
+
+/* ---- the loop's side ---- */
+
+/* In the world, where a metre of the device is motion_scale metres and a newton its share. */
+static void set_gains(const hapi_haptic *haptic, const hapi_pointer_slot *slot, hapi_pointer *p)
+{
+  const hapi_pointer_setup *def = &slot->def;
+  hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, def, haptic->tick.facts.period);
+  double scale = p->device.motion_scale * p->device.force_scale;
+  if (p->proxied && !(scale > 0.0)) {
+    return; /* its spring is felt by nobody; without one it would be nowhere */
+  }
+  p->coupling.hold_known = gains.known && scale > 0.0;
+  p->coupling.hold = p->coupling.hold_known ? gains.stiffness / scale : HUGE_VAL;
+  p->coupling.stiffness = p->coupling.hold_known ? p->coupling.hold : 0.0;
+  p->coupling.damping = p->coupling.hold_known ? gains.damping / scale : 0.0;
+}
+
+/* A proxy turns as if it were held at its vertices: by the square of their arm. Not of a long
+ * tool's: the device's grip is not as long. */
+static void set_spin_coupling(const hapi_pointer_slot *slot, hapi_pointer *p)
+{
+  const hapi_tool_hull *hull = &slot->hull;
+  double sum = 0.0;
+  for (uint32_t i = 0; i < hull->count; ++i) {
+    sum += hapi_v3_dot(hull->points[i], hull->points[i]) / hull->count;
+  }
+  double reach = sqrt(sum) + slot->def.radius;
+  double arm = fmin(reach, GRIP_MOST * p->device.motion_scale);
+  p->coupling.spin_stiffness = arm * arm * p->coupling.stiffness;
+  p->coupling.spin_damping = arm * arm * p->coupling.damping;
+  p->coupling.inertia = arm * arm * p->coupling.mass;
+  if (slot->def.coupling == HAP_COUPLING_VIRTUAL) {
+    p->coupling.inertia = slot->def.virtual_inertia > 0.0
+                              ? slot->def.virtual_inertia
+                              : BALL_INERTIA * reach * reach * p->coupling.mass;
+  }
+}
+
+void hapi_pointer_set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
+                               hapi_pointer *io)
+{
+  const hapi_pointer_setup *def = &slot->def;
+  io->coupling.kind = def->coupling;
+  io->coupling.integration = def->integration;
+  if (def->coupling == HAP_COUPLING_GOD_OBJECT || def->coupling == HAP_COUPLING_VIRTUAL) {
+    io->coupling.integration = HAP_INTEGRATION_IMPLICIT; /* there is no spring of a contact */
+  }
+  io->coupling.mass = def->coupling == HAP_COUPLING_GOD_OBJECT ? 0.0
+                      : def->coupling == HAP_COUPLING_VIRTUAL  ? def->virtual_mass
+                                                               : def->proxy_mass;
+  io->coupling.reason =
+      def->coupling == HAP_COUPLING_AUTO ? HAP_COUPLING_MODEL : HAP_COUPLING_ASKED;
+  set_gains(haptic, slot, io);
+  set_spin_coupling(slot, io);
+}
+
+hapi_device_limits hapi_pointer_limits(const hapi_pointer_slot *slot)
+{
+  const hapi_pointer_setup *def = &slot->def;
+  const hap_device_info *info = &slot->info;
+  hapi_device_limits limits;
+  limits.max_force =
+      info->max_force > 0.0 && info->max_force < def->max_force ? info->max_force : def->max_force;
+  limits.max_torque = info->max_torque > 0.0 && info->max_torque < def->max_torque
+                          ? info->max_torque
+                          : def->max_torque;
+  limits.slew_force = def->max_slew > 0.0 ? def->max_slew : limits.max_force / HAPI_SAFETY_SLEW_S;
+  limits.slew_torque = limits.max_torque * (limits.slew_force / limits.max_force);
+  return limits;
+}
+
+static void glide_to(hapi_glide *glide, double value)
+{
+  *glide = (hapi_glide){.to = value, .left_s = HAPI_SAFETY_SET_S};
+}
+
+/* False: it was there before. */
+static bool glide_follow(hapi_glide *glide, double seconds, double *io)
+{
+  if (!(glide->left_s > 0.0)) {
+    return false;
+  }
+  if (seconds < glide->left_s * (1.0 - 1e-9)) {
+    *io += seconds / glide->left_s * (glide->to - *io);
+    glide->left_s -= seconds;
+  } else {
+    *io = glide->to;
+    glide->left_s = 0.0;
+  }
+  return true;
+}
+
+/* Down as fast as the force itself may fall, up slowly. */
+static double limit_follow(double limit, double wanted, double slew, double seconds)
+{
+  double down = hapi_max(limit - slew * seconds, wanted);
+  return limit > wanted ? down : hapi_min(limit + wanted * seconds / HAPI_SAFETY_LIMIT_S, wanted);
+}
+
+static bool limits_follow(hapi_pointer *p, double seconds)
+{
+  const hapi_device_limits *wanted = &p->glides.wanted;
+  hapi_device_limits *limits = &p->device.limits;
+  limits->max_force =
+      limit_follow(limits->max_force, wanted->max_force, limits->slew_force, seconds);
+  limits->max_torque =
+      limit_follow(limits->max_torque, wanted->max_torque, limits->slew_torque, seconds);
+  if (limits->max_force != wanted->max_force || limits->max_torque != wanted->max_torque) {
+    return true;
+  }
+  *limits = *wanted;
+  return false;
+}
+
+static void pointer_glide(const hapi_haptic *haptic, const hapi_pointer_slot *slot, hapi_pointer *p)
+{
+  hapi_pointer_glides *g = &p->glides;
+  double seconds = haptic->tick.facts.period;
+  double stiffness = p->surface.stiffness;
+  double motion_scale = p->device.motion_scale;
+  bool any = glide_follow(&g->stiffness, seconds, &p->surface.stiffness);
+  any |= glide_follow(&g->damping, seconds, &p->surface.damping);
+  any |= glide_follow(&g->friction, seconds, &p->surface.friction);
+  any |= glide_follow(&g->finger_radius, seconds, &p->surface.finger_radius);
+  p->surface.added = p->surface.stiffness - stiffness;
+  bool scales = glide_follow(&g->force_scale, seconds, &p->device.force_scale);
+  if (glide_follow(&g->motion_scale, seconds, &motion_scale)) {
+    hapi_frame_set_scale(p, motion_scale, g->stands);
+    scales = true;
+  }
+  if (scales) {
+    set_gains(haptic, slot, p);
+    set_spin_coupling(slot, p);
+  }
+  g->limits = g->limits && limits_follow(p, seconds);
+  g->any = any || scales || g->limits; /* one tick longer than needed: added is 0 then */
+}
+
+static void setting_apply_frame(hapi_pointer *p, const hapi_pointer_setting *s, int64_t now_ns)
+{
+  bool leaps = (s->mask & HAP_SET_TELEPORT) != 0;
+  if ((s->mask & HAP_SET_BASE) != 0) {
+    const hapi_frame_base base = {s->def.pose_world_device, s->twist_world_device,
+                                  s->base_time_ns != 0 ? s->base_time_ns : now_ns};
+    hapi_frame_set_base(p, &base, leaps);
+  }
+  if ((s->mask & HAP_SET_UNCLUTCHED) != 0) {
+    hapi_frame_unclutch(p, leaps);
+  }
+  if ((s->mask & HAPI_SET_CLUTCH) != 0) {
+    hapi_frame_clutch(p, s->clutched != 0);
+  }
+  if ((s->mask & HAP_SET_MOTION_SCALE) != 0) {
+    glide_to(&p->glides.motion_scale, s->def.motion_scale);
+    p->glides.stands = (s->mask & HAP_SET_BASE) == 0;
+  }
+}
+
+static void setting_apply(hapi_pointer_slot *slot, hapi_pointer *p, const hapi_pointer_setting *s,
+                          int64_t now_ns)
+{
+  hapi_pointer_glides *g = &p->glides;
+  hapi_settings_copy(s->mask, &s->def, &slot->def);
+  setting_apply_frame(p, s, now_ns);
+  if ((s->mask & HAP_SET_FORCE_SCALE) != 0) {
+    glide_to(&g->force_scale, s->def.force_scale);
+  }
+  if ((s->mask & HAP_SET_STIFFNESS) != 0) {
+    glide_to(&g->stiffness, s->def.stiffness);
+  }
+  if ((s->mask & HAP_SET_DAMPING) != 0) {
+    glide_to(&g->damping, s->def.damping);
+  }
+  if ((s->mask & HAP_SET_FRICTION) != 0) {
+    glide_to(&g->friction, s->def.friction);
+    glide_to(&g->finger_radius, s->def.finger_radius);
+  }
+  if ((s->mask & HAP_SET_LIMITS) != 0) {
+    g->limits = true;
+    g->wanted = hapi_pointer_limits(slot);
+  }
+  g->any = true;
+}
+
+/* Several settings since the last tick are one. */
+static void settings_take(hapi_pointer_settings_box *box, hapi_pointer_setting *out)
+{
+  const hapi_pointer_wishes *wishes = &box->places[hapi_triple_front(&box->buffer)];
+  *out = wishes->value;
+  out->mask = 0;
+  for (int i = 0; i < HAPI_SET_BITS; ++i) {
+    out->mask |= wishes->numbers[i] != box->taken[i] ? 1u << i : 0;
+  }
+  memcpy(box->taken, wishes->numbers, sizeof box->taken);
+}
+
+void hapi_settings_follow(hapi_haptic *haptic, uint32_t index, int64_t now_ns)
+{
+  hapi_pointer_slot *slot = &haptic->slots[index];
+  hapi_pointer *p = &haptic->tick.pointers.of[index];
+  hapi_pointer_setting setting;
+  if (hapi_tape_plays(haptic->tape)) {
+    while (hapi_tape_next_set(haptic, index, &setting)) {
+      setting_apply(slot, p, &setting, now_ns);
+    }
+  } else if (hapi_triple_take(&slot->set.buffer)) {
+    settings_take(&slot->set, &setting);
+    hapi_tape_set(haptic, index, &setting);
+    setting_apply(slot, p, &setting, now_ns);
+  }
+  if (p->glides.any) {
+    pointer_glide(haptic, slot, p);
+  }
+}
+
+/* ---- the application's side ---- */
+
+void hapi_settings_prepare(hapi_pointer_slot *slot)
+{
+  hapi_pointer_settings_box *box = &slot->set;
+  memset(box, 0, sizeof *box);
+  hapi_triple_init(&box->buffer);
+  box->newest.value.def = slot->def;
+  box->newest.value.def.device = NULL;
+  box->newest.value.def.hull_points = 0;
+  box->newest.value.def.velocity = HAP_VELOCITY_AUTO; /* of the device, which is not there */
+}
+
+void hapi_settings_copy(uint32_t mask, const hapi_pointer_setup *from, hapi_pointer_setup *to)
+{
+  if ((mask & HAP_SET_BASE) != 0) {
+    to->pose_world_device = from->pose_world_device;
+  }
+  if ((mask & HAP_SET_MOTION_SCALE) != 0) {
+    to->motion_scale = from->motion_scale;
+  }
+  if ((mask & HAP_SET_FORCE_SCALE) != 0) {
+    to->force_scale = from->force_scale;
+  }
+  if ((mask & HAP_SET_STIFFNESS) != 0) {
+    to->stiffness = from->stiffness;
+  }
+  if ((mask & HAP_SET_DAMPING) != 0) {
+    to->damping = from->damping;
+  }
+  if ((mask & HAP_SET_FRICTION) != 0) {
+    to->friction = from->friction;
+    to->finger_radius = from->finger_radius;
+  }
+  if ((mask & HAP_SET_LIMITS) != 0) {
+    to->max_force = from->max_force;
+    to->max_torque = from->max_torque;
+  }
+}

@@ -1,0 +1,651 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Pointers that are changed while they run, by the public headers, against closed forms. */
+
+#include "tests/tap.h"
+
+#include <time.h>
+
+#include "tests/desk.h"
+#include "tests/files.h"
+
+#define DEPTH 0.002 /* m, that the hand is in the floor */
+#define LIMIT 20.0  /* N */
+#define SET_S 0.02  /* s, in which a setting is reached */
+#define SETTLE 60   /* ticks: beyond every ramp */
+
+static hap_pointer_settings settings_of(uint32_t mask)
+{
+  hap_pointer_settings settings;
+  hap_pointer_settings_init(&settings, sizeof settings);
+  settings.mask = mask;
+  return settings;
+}
+
+static void hand_set(desk *d, const hap_pointer_settings *settings)
+{
+  hap_detail detail = {""};
+  bool good = hap_pointer_set(d->session, d->hand, settings) == HAP_OK;
+  (void)hap_session_detail(d->session, &detail);
+  REQUIRE_SAY(good, "%s", detail.text);
+}
+
+static hap_pointer_state hand_state(const desk *d)
+{
+  hap_pointer_state state;
+  REQUIRE(hap_pointer_get(d->session, d->hand, &state, sizeof state) == HAP_OK);
+  return state;
+}
+
+static double vector_far(const double a[3], const double b[3])
+{
+  return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+              (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* N: the largest change of the force in one of these ticks. The hand stands. */
+static double force_steepest(desk *d, int ticks)
+{
+  double most = 0.0;
+  hap_pointer_state before = hand_state(d);
+  for (int i = 0; i < ticks; ++i) {
+    desk_wait(d, 1);
+    hap_pointer_state now = hand_state(d);
+    most = fmax(most, vector_far(now.wrench.force, before.wrench.force));
+    before = now;
+  }
+  return most;
+}
+
+/* A floor, and a hand that is in it and stands. */
+static desk *floor_desk(hap_model model)
+{
+  desk *d = desk_new(0.0, model);
+  d->hand_def.max_force = LIMIT;
+  floor_add(d);
+  desk_run(d, 0.1, -0.2, RADIUS + 0.002);
+  desk_wait(d, 40);
+  desk_move(d, 0.0, 0.0, -0.002 - DEPTH, 200);
+  desk_wait(d, SETTLE);
+  CHECK_NEAR(hand_state(d).wrench.force[2], STIFFNESS * DEPTH, 1e-9);
+  return d;
+}
+
+/* ---- surface ---- */
+
+typedef struct model_row {
+  const char *name;
+  hap_model model;
+} model_row;
+
+static const model_row stiffened[] = {
+    {"a_stiffness_is_reached_in_20_ms_in_model_single", HAP_MODEL_SINGLE},
+    {"a_stiffness_is_reached_in_20_ms_in_model_impulse", HAP_MODEL_IMPULSE},
+    {"a_stiffness_is_reached_in_20_ms_in_model_accelerance", HAP_MODEL_ACCELERANCE},
+    {"a_stiffness_is_reached_in_20_ms_in_model_contact", HAP_MODEL_CONTACT},
+};
+
+TEST_EACH(stiffened, const model_row *row)
+{
+  desk *d = floor_desk(row->model);
+  hap_pointer_settings s = settings_of(HAP_SET_STIFFNESS);
+  s.stiffness = 3.0 * STIFFNESS;
+  s.damping = 1e9; /* is not in the mask */
+  hand_set(d, &s);
+  double step = 2.0 * STIFFNESS * DEPTH * T / SET_S;
+  CHECK_NEAR(force_steepest(d, 10), step, 1e-9);
+  CHECK_NEAR(hand_state(d).wrench.force[2], 2.0 * STIFFNESS * DEPTH, 1e-9);
+  CHECK_NEAR(force_steepest(d, 10), step, 1e-9);
+  CHECK_NEAR(hand_state(d).wrench.force[2], 3.0 * STIFFNESS * DEPTH, 1e-9);
+  CHECK(force_steepest(d, 10) == 0.0);
+  CHECK(hand_state(d).guard == 0);
+}
+
+TEST(a_stiffness_that_is_set_gives_and_takes_its_own_energy)
+{
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(HAP_SET_STIFFNESS);
+  s.stiffness = 4.0 * STIFFNESS;
+  hand_set(d, &s);
+  desk_wait(d, SETTLE);
+  for (int i = 0; i < 401; ++i) { /* the spring gives back more than the hand put in */
+    desk_move(d, 0.0, 0.0, 0.0025 * DEPTH, 1);
+    CHECK((hand_state(d).guard & HAP_GUARD_ENERGY) == 0);
+  }
+  CHECK(hand_state(d).wrench.force[2] == 0.0);
+}
+
+TEST(damping_that_is_set_is_felt)
+{
+  const double speed = 0.02;
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(HAP_SET_DAMPING);
+  s.damping = 10.0;
+  hand_set(d, &s);
+  desk_wait(d, SETTLE);
+  desk_move(d, 0.0, 0.0, -speed * 0.05, 50);
+  CHECK_NEAR(hand_state(d).wrench.force[2], STIFFNESS * (DEPTH + speed * 0.05) + 10.0 * speed,
+             1e-6);
+}
+
+TEST(friction_that_is_set_is_felt_from_the_next_steps_on)
+{
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(HAP_SET_FRICTION);
+  desk_move(d, 0.01, 0.0, 0.0, 100);
+  CHECK_NEAR(hand_state(d).wrench.force[0], 0.0, 1e-9);
+  s.friction = 0.5;
+  hand_set(d, &s);
+  desk_wait(d, SETTLE);
+  desk_move(d, 0.01, 0.0, 0.0, 100);
+  CHECK_NEAR(hand_state(d).wrench.force[0], -0.5 * STIFFNESS * DEPTH, 1e-6);
+  s.finger_radius = 0.005; /* while it sticks */
+  hand_set(d, &s);
+  CHECK(force_steepest(d, SETTLE) < 1e-9);
+  s.friction = 0.0;
+  hand_set(d, &s);
+  CHECK(force_steepest(d, SETTLE) < 1.0);
+  CHECK_NEAR(hand_state(d).wrench.force[0], 0.0, 1e-9);
+}
+
+TEST(what_is_set_to_what_it_is_changes_no_force)
+{
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(0);
+  REQUIRE(hap_pointer_settings_get(d->session, d->hand, &s) == HAP_OK);
+  for (int i = 0; i < 5; ++i) {
+    hand_set(d, &s);
+    CHECK(force_steepest(d, 7) < 1e-12);
+  }
+}
+
+/* ---- limits and scales ---- */
+
+TEST(a_limit_falls_with_the_slew_limit_and_rises_slowly)
+{
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(HAP_SET_LIMITS);
+  desk_move(d, 0.0, 0.0, -0.02, 400);
+  CHECK_NEAR(hand_state(d).wrench.force[2], LIMIT, 1e-9);
+  s.max_force = 0.1 * LIMIT;
+  hand_set(d, &s);
+  CHECK_NEAR(force_steepest(d, 4), LIMIT / 0.002 * T, 1e-6);
+  CHECK_NEAR(hand_state(d).wrench.force[2], 0.1 * LIMIT, 1e-9);
+  s.max_force = LIMIT;
+  hand_set(d, &s);
+  CHECK(force_steepest(d, 50) <= LIMIT * T / 0.1 + 1e-9);
+  CHECK_NEAR(hand_state(d).wrench.force[2], 0.6 * LIMIT, 1e-6);
+  desk_wait(d, 100);
+  CHECK_NEAR(hand_state(d).wrench.force[2], LIMIT, 1e-9);
+}
+
+TEST(while_the_motion_scale_changes_the_pointer_stands_and_nothing_leaps)
+{
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(HAP_SET_MOTION_SCALE);
+  s.motion_scale = 3.0;
+  hand_set(d, &s);
+  CHECK(force_steepest(d, SETTLE) < 1e-9);
+  hap_pointer_state state = hand_state(d);
+  check_vector(state.proxy.position, 0.1, -0.2, RADIUS - DEPTH, 1e-12);
+  desk_move(d, 0.001, 0.0, 0.0, 10);
+  check_vector(hand_state(d).proxy.position, 0.103, -0.2, RADIUS - DEPTH, 1e-12);
+  CHECK_NEAR(hand_state(d).twist.linear[0], 0.3, 1e-9);
+}
+
+/* ---- the base ---- */
+
+typedef struct coupling_row {
+  const char *name;
+  hap_coupling coupling;
+} coupling_row;
+
+static const coupling_row couplings[] = {
+    {"a_moving_base_is_no_force_for_a_pointer_that_is_direct", HAP_COUPLING_DIRECT},
+    {"a_moving_base_is_no_force_for_a_proxy", HAP_COUPLING_PROXY},
+    {"a_moving_base_is_no_force_for_a_god_object", HAP_COUPLING_GOD_OBJECT},
+    {"a_moving_base_is_no_force_for_a_virtual_tool", HAP_COUPLING_VIRTUAL},
+};
+
+TEST_EACH(couplings, const coupling_row *row)
+{
+  hap_pointer_expert_def expert;
+  hap_pointer_expert_def_init(&expert, sizeof expert);
+  expert.coupling = row->coupling;
+  expert.coupling_stiffness = 1000.0;
+  expert.coupling_damping = 2.0;
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  d->hand_def.expert = &expert;
+  desk_run(d, 0.1, 0.2, 0.3);
+  desk_wait(d, SETTLE);
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.twist_world_device = (hap_twist){{2.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  for (int frame = 0; frame < 20; ++frame) { /* locomotion at 2 m/s, of 90 frames a second */
+    s.pose_world_device.position[0] = 0.022 * frame;
+    hand_set(d, &s);
+    for (int i = 0; i < 11; ++i) {
+      desk_wait(d, 1);
+      hap_pointer_state state = hand_state(d);
+      CHECK(vector_far(state.wrench.force, AT(0.0, 0.0, 0.0)) < 1e-3);
+      CHECK_NEAR(state.proxy.position[0], 0.1 + 0.022 * frame + 0.002 * i,
+                 row->coupling == HAP_COUPLING_DIRECT ? 1e-9 : 3e-3);
+    }
+  }
+  CHECK(hand_state(d).guard == 0);
+  CHECK(session_stats(d->session).faults.fault == HAP_FAULT_NONE);
+}
+
+TEST(a_base_that_is_not_set_again_goes_on_for_50_ms_and_comes_to_rest)
+{
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  desk_run(d, 0.0, 0.0, 0.3);
+  desk_wait(d, SETTLE);
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.twist_world_device.linear[1] = 1.0;
+  hand_set(d, &s);
+  desk_wait(d, 51);
+  CHECK_NEAR(hand_state(d).proxy.position[1], 0.05, 1e-9);
+  CHECK_NEAR(hand_state(d).twist.linear[1], 1.0, 1e-9);
+  desk_wait(d, 10);
+  CHECK_NEAR(hand_state(d).twist.linear[1], 0.5, 1e-6);
+  desk_wait(d, 200);
+  CHECK_NEAR(hand_state(d).proxy.position[1], 0.06, 1e-9);
+  CHECK_NEAR(hand_state(d).twist.linear[1], 0.0, 1e-12);
+}
+
+TEST(a_base_that_turns_takes_the_pointer_about_its_origin)
+{
+  const double spin = 2.0;
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  desk_run(d, 0.5, 0.0, 0.3);
+  desk_wait(d, SETTLE);
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.twist_world_device.angular[2] = spin;
+  hand_set(d, &s);
+  desk_wait(d, 41);
+  hap_pointer_state state = hand_state(d);
+  double angle = spin * 0.04;
+  check_vector(state.proxy.position, 0.5 * cos(angle), 0.5 * sin(angle), 0.3, 1e-4);
+  check_vector(state.twist.linear, -0.5 * spin * sin(angle), 0.5 * spin * cos(angle), 0.0, 1e-3);
+  CHECK_NEAR(state.twist.angular[2], spin, 1e-9);
+  CHECK_NEAR(state.proxy.quat_wxyz[3], sin(0.5 * angle), 1e-4);
+}
+
+TEST(a_time_of_the_base_takes_the_noise_of_threads_out)
+{
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  desk_run(d, 0.0, 0.0, 0.3);
+  desk_wait(d, SETTLE);
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.twist_world_device.linear[0] = 3.0;
+  for (int frame = 0; frame < 10; ++frame) {
+    int64_t now = hap_session_now(d->session);
+    int64_t of_frame = now - 1000000 * (frame * 7 % 5); /* up to 4 ms ago */
+    s.base_time_ns = of_frame;
+    s.pose_world_device.position[0] = 3.0 * 1e-9 * (double)of_frame;
+    s.mask = HAP_SET_BASE | (frame == 0 ? HAP_SET_TELEPORT : 0);
+    hand_set(d, &s);
+    for (int i = 0; i < 11; ++i) {
+      desk_wait(d, 1);
+      hap_pointer_state state = hand_state(d);
+      CHECK_NEAR(state.proxy.position[0], 3.0 * 1e-9 * (double)state.stamp_ns, 1e-9);
+      CHECK_NEAR(state.twist.linear[0], 3.0, 1e-6);
+    }
+  }
+}
+
+TEST(a_surface_feels_the_velocity_of_the_base)
+{
+  const double speed = 0.05;
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(HAP_SET_DAMPING | HAP_SET_FRICTION);
+  s.damping = 20.0;
+  s.friction = 0.4;
+  hand_set(d, &s);
+  desk_wait(d, SETTLE);
+  s = settings_of(HAP_SET_BASE);
+  s.twist_world_device.linear[2] = -speed;
+  hand_set(d, &s);
+  desk_wait(d, 41);
+  CHECK_NEAR(hand_state(d).wrench.force[2], STIFFNESS * (DEPTH + speed * 0.04) + 20.0 * speed,
+             1e-6);
+  s.pose_world_device.position[2] = -speed * 0.041;
+  s.twist_world_device = (hap_twist){{0.5, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hand_set(d, &s);
+  desk_wait(d, 41);
+  double normal = STIFFNESS * (DEPTH + speed * 0.041);
+  check_vector(hand_state(d).wrench.force, -0.4 * normal, 0.0, normal, 1e-3);
+}
+
+/* On a belt, that moves as the base does, nothing is felt of either. */
+TEST(a_base_that_rides_on_a_platform_changes_no_force)
+{
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID lift = ode_box(d->world, d->space, 1.0, AT(1.0, 1.0, 0.1), AT(0.0, 0.0, -0.05));
+  dBodySetKinematic(lift);
+  d->hand_def.friction = 0.5;
+  desk_run(d, 0.1, -0.2, RADIUS - DEPTH);
+  desk_wait(d, 200);
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.twist_world_device.linear[0] = 0.5;
+  s.twist_world_device.linear[2] = 0.25;
+  REQUIRE(hap_session_lock(d->session) == HAP_OK);
+  dBodySetLinearVel(lift, 0.5, 0.0, 0.25);
+  hap_session_unlock(d->session);
+  hand_set(d, &s);
+  desk_wait(d, 100); /* they begin at different ticks */
+  for (int i = 0; i < 20; ++i) {
+    hap_pose pose;
+    REQUIRE(hap_session_poses_now(d->session, &lift, 1, &pose) == HAP_OK);
+    s.pose_world_device.position[0] = pose.position[0];
+    s.pose_world_device.position[2] = pose.position[2] + 0.05;
+    hand_set(d, &s);
+    double change = force_steepest(d, 20);
+    if (i > 3) {
+      CHECK_NEAR(change, 0.0, 1e-3);
+      CHECK_NEAR(hand_state(d).wrench.force[2], STIFFNESS * DEPTH, 0.3);
+    }
+  }
+}
+
+TEST(what_a_base_presses_in_the_hand_gets_back)
+{
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.twist_world_device.linear[2] = -0.2;
+  hand_set(d, &s);
+  desk_wait(d, 100); /* by 12 mm */
+  CHECK_NEAR(hand_state(d).wrench.force[2], STIFFNESS * (DEPTH + 0.012), 1e-6);
+  for (int i = 0; i < 1000; ++i) {
+    desk_move(d, 0.0, 0.0, 0.000015, 1);
+    CHECK((hand_state(d).guard & HAP_GUARD_ENERGY) == 0);
+  }
+  CHECK(hand_state(d).wrench.force[2] == 0.0);
+}
+
+TEST(a_base_that_is_elsewhere_is_reached_in_20_ms)
+{
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.pose_world_device.position[0] = 0.1;
+  s.pose_world_device.position[2] = -0.004;
+  hand_set(d, &s);
+  desk_wait(d, 1);
+  CHECK_NEAR(force_steepest(d, 10), STIFFNESS * 0.004 * T / SET_S, 1e-6);
+  check_vector(hand_state(d).proxy.position, 0.15, -0.2, RADIUS - DEPTH - 0.002, 1e-9);
+  check_vector(hand_state(d).twist.linear, 5.0, 0.0, -0.2, 1e-9);
+  desk_wait(d, 20);
+  check_vector(hand_state(d).proxy.position, 0.2, -0.2, RADIUS - DEPTH - 0.004, 1e-12);
+  check_vector(hand_state(d).twist.linear, 0.0, 0.0, 0.0, 1e-12);
+}
+
+TEST(a_base_that_is_far_away_or_asked_to_leap_takes_the_pointer_there_at_once)
+{
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  d->hand_def.max_force = LIMIT;
+  floor_add(d);
+  desk_run(d, 0.0, 0.0, 0.3);
+  desk_wait(d, SETTLE);
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.pose_world_device.position[0] = 5.0;
+  hand_set(d, &s);
+  desk_wait(d, 1);
+  check_vector(hand_state(d).proxy.position, 5.0, 0.0, 0.3, 1e-12);
+  check_vector(hand_state(d).twist.linear, 0.0, 0.0, 0.0, 1e-12);
+  s.mask |= HAP_SET_TELEPORT;
+  s.pose_world_device.position[2] = -0.295 + RADIUS; /* into the floor, 5 mm */
+  s.pose_world_device.position[2] -= 0.01;
+  s.pose_world_device.position[0] = 5.01;
+  hand_set(d, &s);
+  CHECK(force_steepest(d, SETTLE) < 0.5); /* nobody pressed it in */
+  check_vector(hand_state(d).proxy.position, 5.01, 0.0, 0.005, 1e-12);
+  CHECK(session_stats(d->session).faults.fault == HAP_FAULT_NONE);
+}
+
+/* ---- clutch and workspace ---- */
+
+static const model_row clutched[] = {
+    {"with_the_clutch_held_the_device_moves_and_the_pointer_stands_in_model_impulse",
+     HAP_MODEL_IMPULSE},
+    {"with_the_clutch_held_the_device_moves_and_the_pointer_stands_in_model_contact",
+     HAP_MODEL_CONTACT},
+};
+
+TEST_EACH(clutched, const model_row *row)
+{
+  desk *d = floor_desk(row->model);
+  REQUIRE(hap_pointer_clutch(d->session, d->hand, true) == HAP_OK);
+  CHECK_NEAR(force_steepest(d, 20), STIFFNESS * DEPTH * T / SET_S, 1e-9);
+  CHECK_NEAR(hand_state(d).wrench.force[2], 0.0, 1e-12);
+  desk_move(d, -0.05, 0.02, 0.07, 50);
+  hap_pointer_state state = hand_state(d);
+  check_vector(state.proxy.position, 0.1, -0.2, RADIUS - DEPTH, 1e-12);
+  check_vector(state.twist.linear, 0.0, 0.0, 0.0, 1e-12);
+  CHECK(state.wrench.force[2] == 0.0);
+  REQUIRE(hap_pointer_clutch(d->session, d->hand, false) == HAP_OK);
+  desk_wait(d, 1);
+  CHECK(force_steepest(d, 30) <= STIFFNESS * DEPTH * T / SET_S + 1e-9);
+  CHECK_NEAR(hand_state(d).wrench.force[2], STIFFNESS * DEPTH, 1e-9);
+  desk_move(d, 0.01, 0.0, -0.001, 20);
+  check_vector(hand_state(d).proxy.position, 0.11, -0.2, RADIUS - DEPTH - 0.001, 1e-12);
+  hap_pointer_settings s = settings_of(HAP_SET_UNCLUTCHED);
+  hand_set(d, &s);
+  desk_wait(d, SETTLE);
+  check_vector(hand_state(d).proxy.position, d->at[0], d->at[1], d->at[2], 1e-12);
+}
+
+TEST(a_clutch_keeps_the_turn_and_the_pointer_turns_as_the_hand_does)
+{
+  const double half = 0.3;
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  desk_run(d, 0.0, 0.0, 0.3);
+  desk_wait(d, SETTLE);
+  REQUIRE(hap_pointer_clutch(d->session, d->hand, true) == HAP_OK);
+  desk_wait(d, 5);
+  hap_pose pose = {{0.0, 0.0, 0.3}, {cos(half), sin(half), 0.0, 0.0}};
+  REQUIRE(hap_pointer_set_target(d->session, d->hand, &pose, NULL) == HAP_OK);
+  REQUIRE(hap_session_advance(d->session, 5) >= HAP_OK);
+  CHECK_NEAR(hand_state(d).proxy.quat_wxyz[0], 1.0, 1e-12);
+  REQUIRE(hap_pointer_clutch(d->session, d->hand, false) == HAP_OK);
+  REQUIRE(hap_session_advance(d->session, 5) >= HAP_OK);
+  CHECK_NEAR(hand_state(d).proxy.quat_wxyz[0], 1.0, 1e-12);
+  /* About z of the world, beyond the turn about x: the pointer turns about z of the world. */
+  pose = (hap_pose){
+      {0.0, 0.0, 0.3},
+      {cos(half) * cos(0.1), sin(half) * cos(0.1), sin(half) * sin(0.1), cos(half) * sin(0.1)}};
+  REQUIRE(hap_pointer_set_target(d->session, d->hand, &pose, NULL) == HAP_OK);
+  REQUIRE(hap_session_advance(d->session, 5) >= HAP_OK);
+  hap_pointer_state state = hand_state(d);
+  CHECK_NEAR(state.proxy.quat_wxyz[1], 0.0, 1e-12);
+  CHECK_NEAR(state.proxy.quat_wxyz[2], 0.0, 1e-12);
+  CHECK_NEAR(state.proxy.quat_wxyz[3], sin(0.1), 1e-12);
+}
+
+TEST(a_workspace_is_fitted_to_a_box)
+{
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  desk_run(d, 0.0, 0.0, 0.0);
+  desk_wait(d, SETTLE);
+  /* A quarter turn about z: the device's x goes along the world's y. */
+  const hap_pose box = {{1.0, 2.0, 3.0}, {sqrt(0.5), 0.0, 0.0, sqrt(0.5)}};
+  REQUIRE(hap_pointer_fit_workspace(d->session, d->hand, AT(-0.1, -0.05, 0.0), AT(0.1, 0.05, 0.1),
+                                    &box, AT(0.8, 0.2, 0.2)) == HAP_OK);
+  desk_wait(d, SETTLE);
+  d->at[0] = 0.1, d->at[1] = 0.05, d->at[2] = 0.1;
+  desk_wait(d, 5);
+  check_vector(hand_state(d).proxy.position, 1.0 - 0.2, 2.0 + 0.4, 3.0 + 0.2, 1e-9);
+  CHECK(hap_pointer_fit_workspace(d->session, d->hand, AT(0.1, 0.0, 0.0), AT(0.1, 0.05, 0.1), &box,
+                                  AT(0.8, 0.2, 0.2)) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_fit_workspace(d->session, d->hand, AT(0.0, 0.0, 0.0), AT(0.1, 0.05, 0.1), &box,
+                                  AT(0.8, NAN, 0.2)) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_fit_workspace(d->session, d->hand, NULL, AT(0.1, 0.05, 0.1), &box,
+                                  AT(0.8, 0.2, 0.2)) == HAP_ERROR_ARGUMENT);
+}
+
+/* ---- devices ---- */
+
+/* The guard judges the device in its own frame, and the id stays. */
+TEST(a_fast_base_and_a_clutch_are_no_fault_of_the_device)
+{
+  hap_detail detail;
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  floor_add(d);
+  REQUIRE(hap_device_open("virtual:path=0:0/0/0.05;0.4:0.02/0/0.05;0.8:0/0/0.05",
+                          &d->hand_def.device, &detail) == HAP_OK);
+  d->hand_def.motion_scale = 2.0;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  session_run(d->session);
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.twist_world_device.linear[0] = 30.0;
+  for (int i = 0; i < 40; ++i) {
+    s.pose_world_device.position[0] = 0.3 * i;
+    s.pose_world_device.position[2] = i < 20 ? 0.0 : -0.05;
+    hand_set(d, &s);
+    REQUIRE(hap_session_advance(d->session, 10) >= HAP_OK);
+    CHECK((hand_state(d).guard & (HAP_GUARD_INPUT | HAP_GUARD_FAULT)) == 0);
+    REQUIRE(hap_pointer_clutch(d->session, d->hand, i % 4 == 0) == HAP_OK);
+  }
+  CHECK(session_stats(d->session).faults.fault == HAP_FAULT_NONE);
+  hap_session_destroy(d->session);
+  d->session = NULL;
+  hap_device_close(d->hand_def.device);
+}
+
+/* ---- what is asked ---- */
+
+TEST(what_was_set_is_told)
+{
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  desk_run(d, 0.0, 0.0, 0.3);
+  hap_pointer_settings s = settings_of(HAP_SET_STIFFNESS | HAP_SET_BASE);
+  s.stiffness = 2500.0;
+  s.friction = 3.0;
+  s.pose_world_device.position[1] = 2.0;
+  s.twist_world_device.angular[0] = 0.5;
+  hand_set(d, &s);
+  hap_pointer_settings told = settings_of(0);
+  REQUIRE(hap_pointer_settings_get(d->session, d->hand, &told) == HAP_OK);
+  CHECK(told.stiffness == 2500.0 && told.friction == 0.0 && told.motion_scale == 1.0);
+  CHECK(told.pose_world_device.position[1] == 2.0 && told.twist_world_device.angular[0] == 0.5);
+  CHECK(told.max_force == d->hand_def.max_force && told.damping == 0.0);
+  CHECK((told.mask & HAP_SET_STIFFNESS) != 0 && (told.mask & HAP_SET_TELEPORT) == 0);
+}
+
+TEST(wrong_settings_change_nothing_and_say_what_is_wrong)
+{
+  hap_detail detail;
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  desk_run(d, 0.0, 0.0, 0.3);
+  hap_pointer_settings s = settings_of(HAP_SET_STIFFNESS | HAP_SET_DAMPING);
+  s.stiffness = 5.0;
+  s.damping = NAN;
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
+  (void)hap_session_detail(d->session, &detail);
+  CHECK(strstr(detail.text, "damping") != NULL);
+  hap_pointer_settings told = settings_of(0);
+  REQUIRE(hap_pointer_settings_get(d->session, d->hand, &told) == HAP_OK);
+  CHECK(told.stiffness == STIFFNESS);
+  s = settings_of(1u << 20);
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
+  s = settings_of(HAP_SET_TELEPORT);
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
+  s = settings_of(HAP_SET_BASE);
+  s.pose_world_device.quat_wxyz[0] = 2.0;
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
+  s = settings_of(HAP_SET_BASE);
+  s.twist_world_device.linear[0] = INFINITY;
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
+  s = settings_of(HAP_SET_BASE);
+  s.base_time_ns = -1;
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
+  s = settings_of(0);
+  CHECK(hap_pointer_set(d->session, (hap_pointer_id){12345}, &s) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_pointer_clutch(d->session, (hap_pointer_id){12345}, true) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_pointer_settings_get(d->session, (hap_pointer_id){12345}, &told) ==
+        HAP_ERROR_NOT_FOUND);
+  CHECK(hap_pointer_set(d->session, d->hand, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_set(NULL, d->hand, &s) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_clutch(NULL, d->hand, true) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_settings_get(NULL, d->hand, &told) == HAP_ERROR_ARGUMENT);
+  s.cookie = 0;
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_UNINITIALISED);
+  CHECK(hap_pointer_settings_get(d->session, d->hand, &s) == HAP_ERROR_UNINITIALISED);
+}
+
+/* ---- recordings ---- */
+
+static void hand_ride(desk *d)
+{
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  for (int i = 0; i < 40; ++i) { /* from a thread of its own, at any time */
+    s.mask = HAP_SET_BASE | (i % 7 == 0 ? HAP_SET_STIFFNESS | HAP_SET_FRICTION : 0) |
+             (i % 9 == 0 ? HAP_SET_MOTION_SCALE | HAP_SET_LIMITS : 0) |
+             (i % 13 == 5 ? HAP_SET_UNCLUTCHED | HAP_SET_TELEPORT : 0);
+    s.pose_world_device.position[0] = 0.002 * i;
+    s.twist_world_device.linear[0] = 0.4;
+    s.twist_world_device.angular[2] = 0.1;
+    s.stiffness = 500.0 + 50.0 * i;
+    s.friction = 0.01 * i;
+    s.motion_scale = 1.0 + 0.01 * i;
+    s.max_force = 20.0 - 0.2 * i;
+    hand_set(d, &s);
+    if (i % 8 == 3) {
+      REQUIRE(hap_pointer_clutch(d->session, d->hand, i % 16 == 3) == HAP_OK);
+    }
+    d->at[2] = RADIUS - 0.002 + 0.0001 * (i % 5);
+    hand_lead(d);
+    nanosleep(&(struct timespec){.tv_nsec = 6000000}, NULL);
+  }
+}
+
+TEST(a_replay_has_what_was_set_bit_for_bit)
+{
+  hap_detail detail = {""};
+  hap_record_def file;
+  hap_player *player = NULL;
+  hap_expert_def expert;
+  hap_research_def research;
+  REQUIRE(folder_make());
+  hap_record_def_init(&file, sizeof file);
+  file.path = folder_path("set.rec");
+  desk *d = desk_new(10.0, HAP_MODEL_CONTACT);
+  floor_add(d);
+  ode_box(d->world, d->space, 0.1, AT(0.04, 0.04, 0.04), AT(0.05, 0.0, 0.02));
+  d->def.drive = HAP_DRIVE_THREADS;
+  d->def.rt_priority = 0;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_session_record(d->session, &file, &detail) == HAP_OK);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  d->at[2] = RADIUS;
+  hand_lead(d);
+  hap_pointer_settings s = settings_of(HAP_SET_DAMPING);
+  s.damping = 3.0; /* before the first tick */
+  hand_set(d, &s);
+  session_run(d->session);
+  hand_ride(d);
+  CHECK(hap_session_stop(d->session) == HAP_OK);
+  tap_release(d);
+
+  desk *r = desk_new(10.0, HAP_MODEL_CONTACT);
+  floor_add(r);
+  ode_box(r->world, r->space, 0.1, AT(0.04, 0.04, 0.04), AT(0.05, 0.0, 0.02));
+  hap_expert_def_init(&expert, sizeof expert);
+  hap_research_def_init(&research, sizeof research);
+  REQUIRE(hap_player_open(file.path, HAP_PLAY_WHOLE, &player, &detail) >= HAP_OK);
+  REQUIRE(hap_player_get_def(player, &r->def, &expert, &research) >= HAP_OK);
+  r->session = session_make(&r->def, &r->ode);
+  REQUIRE(hap_session_play(r->session, player, &detail) >= HAP_OK);
+  session_run(r->session);
+  hap_status status = HAP_OK;
+  while (status == HAP_OK) {
+    status = hap_session_advance(r->session, 100);
+  }
+  (void)hap_session_detail(r->session, &detail);
+  REQUIRE_SAY(status == HAP_END, "%s", detail.text);
+  CHECK(hap_pointer_set(r->session, (hap_pointer_id){1}, &s) == HAP_ERROR_STATE);
+  hap_session_destroy(r->session);
+  r->session = NULL;
+  hap_player_close(player);
+}
