@@ -206,8 +206,9 @@ static void spidar_spoil(driven_spidar *d, double time, void *user)
 
 static stage *opening; /* whose device is being opened: a test runs one after the other */
 
-static hap_status wrapped_open(const char *args, void **self, hap_detail *detail)
+static hap_status wrapped_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   hap_status status = hap_device_open(args, &opening->inner, detail);
   *self = status >= HAP_OK ? opening : NULL;
   return status;
@@ -223,10 +224,10 @@ static void *inner_self(const stage *s)
   return hapi_device_self(s->inner);
 }
 
-static void wrapped_describe(void *self, hap_device_info *out)
+static void wrapped_describe(void *self, uint32_t effector, hap_device_info *out)
 {
   const stage *s = self;
-  inner_ops(s)->describe(inner_self(s), out);
+  inner_ops(s)->describe(inner_self(s), effector, out);
 }
 
 static hap_status wrapped_start(void *self)
@@ -285,28 +286,29 @@ static void pose_spoil(stage *s, double since, hap_pose *io, hap_twist *twist)
   }
 }
 
-static hap_status wrapped_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                               uint32_t *buttons)
+static hap_status wrapped_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   stage *s = self;
   uint64_t before = s->reads;
   bool keeps = s->def->device == FALSE_INPUT_COARSE && before > 0 &&
                1e-9 * (double)(time_ns - s->told_ns) < HOLD_S - 1e-6;
-  hap_status status = inner_ops(s)->read(inner_self(s), time_ns, pose, twist, buttons);
+  hap_status status = inner_ops(s)->read(inner_self(s), time_ns, out);
   if (keeps) {
-    *pose = s->told[(before - 1) % OLD_MAX];
-    *twist = s->told_twist[(before - 1) % OLD_MAX];
+    in->pose = s->told[(before - 1) % OLD_MAX];
+    in->twist = s->told_twist[(before - 1) % OLD_MAX];
   } else {
     s->told_ns = time_ns;
   }
-  s->told[before % OLD_MAX] = *pose;
-  s->told_twist[before % OLD_MAX] = *twist;
+  s->told[before % OLD_MAX] = in->pose;
+  s->told_twist[before % OLD_MAX] = in->twist;
   ++s->reads;
-  pose_spoil(s, false_time(1e-9 * (double)time_ns), pose, twist);
+  pose_spoil(s, false_time(1e-9 * (double)time_ns), &in->pose, &in->twist);
   return status;
 }
 
-static hap_status wrapped_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status wrapped_write(void *self, const hap_device_output *const wanted[],
+                                hap_device_output *const reached[])
 {
   const stage *s = self;
   return inner_ops(s)->write(inner_self(s), wanted, reached);

@@ -18,6 +18,7 @@
 #include "base/thread.h"
 #include "bench/bench.h"
 #include "device/device.h"
+#include "device/one_effector.h"
 #include "plugins/spidar/spidar.h"
 
 /* A loop of 1 kHz that asks something at each tick and wants the answer by the next one; and the
@@ -288,8 +289,8 @@ static line_answer device_tick(void *self)
   hap_wrench reached;
   uint32_t buttons;
   double before = s->self->line.taken;
-  bool good = s->ops->read(s->self, hapi_clock_now(), &pose, &twist, &buttons) >= HAP_OK &&
-              s->ops->write(s->self, &wanted, &reached) >= HAP_OK;
+  bool good = hapi_one_read(s->ops, s->self, hapi_clock_now(), &pose, &twist, &buttons) >= HAP_OK &&
+              hapi_one_write(s->ops, s->self, &wanted, &reached) >= HAP_OK;
   if (!good) {
     return LINE_FAILED;
   }

@@ -124,16 +124,18 @@ static void osc_step(osc_stage *s)
 
 static osc_stage *osc_opening; /* one after the other */
 
-static hap_status osc_open(const char *args, void **self, hap_detail *detail)
+static hap_status osc_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   (void)args;
   (void)detail;
   *self = osc_opening;
   return HAP_OK;
 }
 
-static void osc_describe(void *self, hap_device_info *out)
+static void osc_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   const osc_stage *s = self;
   out->dof = 3;
   out->max_force = s->def->max_force;
@@ -151,34 +153,35 @@ static hap_status osc_start(void *self)
   return HAP_OK;
 }
 
-static hap_status osc_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                           uint32_t *buttons)
+static hap_status osc_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   osc_stage *s = self;
   double quantum = s->def->plant.quantum;
   while (s->time < 1e-9 * (double)time_ns - 0.5 * STEP_S) {
     osc_step(s);
   }
   uint64_t age = 1 + (uint64_t)(s->def->plant.delay_s / STEP_S + 0.5);
-  memset(pose, 0, sizeof *pose);
-  memset(twist, 0, sizeof *twist);
-  pose->quat_wxyz[0] = 1.0;
-  hapi_v3_copy(s->past[(s->steps + PAST - age) % PAST], pose->position);
+  memset(&in->pose, 0, sizeof in->pose);
+  memset(&in->twist, 0, sizeof in->twist);
+  in->pose.quat_wxyz[0] = 1.0;
+  hapi_v3_copy(s->past[(s->steps + PAST - age) % PAST], in->pose.position);
   if (s->steps > 0) {
-    hapi_v3_copy(s->past_velocity[(s->steps + PAST - age) % PAST], twist->linear);
+    hapi_v3_copy(s->past_velocity[(s->steps + PAST - age) % PAST], in->twist.linear);
   }
   for (int k = 0; k < 3 && quantum > 0.0; ++k) {
-    pose->position[k] = quantum * round(pose->position[k] / quantum);
+    in->pose.position[k] = quantum * round(in->pose.position[k] / quantum);
   }
-  *buttons = 0;
+  in->buttons = 0;
   return HAP_OK;
 }
 
-static hap_status osc_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status osc_write(void *self, const hap_device_output *const wanted[],
+                            hap_device_output *const reached[])
 {
   osc_stage *s = self;
-  hapi_v3_copy(wanted->force, s->held);
-  *reached = *wanted;
+  hapi_v3_copy(wanted[0]->wrench.force, s->held);
+  reached[0]->wrench = wanted[0]->wrench;
   return HAP_OK;
 }
 

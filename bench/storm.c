@@ -453,8 +453,9 @@ typedef struct storm_hand {
   storm_book book;
 } storm_hand;
 
-static hap_status hand_open_hand(const char *args, void **self, hap_detail *detail)
+static hap_status hand_open_hand(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   storm_hand *hand = hapi_alloc(sizeof *hand);
   (void)detail;
   if (hand == NULL) {
@@ -470,8 +471,9 @@ static hap_status hand_open_hand(const char *args, void **self, hap_detail *deta
   return HAP_OK;
 }
 
-static void hand_describe(void *self, hap_device_info *out)
+static void hand_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   (void)self;
   out->dof = 3;
   out->max_force = STORM_FORCE;
@@ -491,28 +493,29 @@ static hap_status hand_start(void *self)
   return HAP_OK;
 }
 
-static hap_status read_hand(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                            uint32_t *buttons)
+static hap_status read_hand(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   const storm_hand *hand = self;
   double rate = 6.283185307179586 * hand->hz;
   double angle = rate * 1e-9 * (double)time_ns;
   double way[3] = {cos(angle), sin(angle), 0.5 * sin(angle)};
   double speed[3] = {-sin(angle), cos(angle), 0.5 * cos(angle)};
-  *pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  hapi_v3_madd(hand->center, hand->radius, way, pose->position);
-  hapi_v3_scale(hand->radius * rate, speed, twist->linear);
-  *buttons = 0;
+  in->pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  hapi_v3_madd(hand->center, hand->radius, way, in->pose.position);
+  hapi_v3_scale(hand->radius * rate, speed, in->twist.linear);
+  in->buttons = 0;
   return HAP_OK;
 }
 
-static hap_status write_hand(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status write_hand(void *self, const hap_device_output *const wanted[],
+                             hap_device_output *const reached[])
 {
   storm_hand *hand = self;
   storm_book *book = &hand->book;
   double change[3];
-  hapi_v3_sub(wanted->force, hand->force, change);
-  double force = hapi_v3_norm(wanted->force);
+  hapi_v3_sub(wanted[0]->wrench.force, hand->force, change);
+  double force = hapi_v3_norm(wanted[0]->wrench.force);
   double step = hapi_v3_norm(change);
   bool good = hand->running && force <= STORM_FORCE * (1.0 + 1e-9) &&
               step <= STORM_SLEW * (1.0 + 1e-9); /* not for NaN */
@@ -520,8 +523,8 @@ static hap_status write_hand(void *self, const hap_wrench *wanted, hap_wrench *r
   book->peak = fmax(book->peak, force);
   book->steepest = fmax(book->steepest, step);
   ++book->writes;
-  hand_hold(hand, wanted->force);
-  *reached = *wanted;
+  hand_hold(hand, wanted[0]->wrench.force);
+  reached[0]->wrench = wanted[0]->wrench;
   return HAP_OK;
 }
 

@@ -47,16 +47,18 @@ typedef struct fake_device {
 static fake_device fakes[FAKES_MAX]; /* in the order in which they are opened */
 static int fakes_opened;
 
-static hap_status fake_open(const char *args, void **self, hap_detail *detail)
+static hap_status fake_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   (void)args;
   (void)detail;
   *self = &fakes[fakes_opened++];
   return HAP_OK;
 }
 
-static void fake_describe(void *self, hap_device_info *out)
+static void fake_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   fake_device *d = self;
   *out = d->info;
 }
@@ -72,42 +74,43 @@ static hap_status fake_start(void *self)
   return HAP_OK;
 }
 
-static hap_status fake_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                            uint32_t *buttons)
+static hap_status fake_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   fake_device *d = self;
   atomic_fetch_add(&d->reads, 1);
   atomic_fetch_add(&d->wrong, atomic_load(&d->running) != 1);
   atomic_store(&d->since_read, 1);
-  memset(twist, 0, sizeof *twist);
-  *pose = (hap_pose){{d->x, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  *buttons = 5;
-  hap_status status = d->move != NULL ? d->move(d, time_ns, pose, buttons) : HAP_OK;
+  memset(&in->twist, 0, sizeof in->twist);
+  in->pose = (hap_pose){{d->x, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  in->buttons = 5;
+  hap_status status = d->move != NULL ? d->move(d, time_ns, &in->pose, &in->buttons) : HAP_OK;
   if (atomic_load(&d->fail_read) != 0) {
-    pose->position[0] = -0.02; /* not to be used */
+    in->pose.position[0] = -0.02; /* not to be used */
     return HAP_ERROR_DEVICE;
   }
   if (atomic_load(&d->bad_pose) != 0) {
-    pose->position[1] = (double)NAN;
+    in->pose.position[1] = (double)NAN;
   }
   return status;
 }
 
-static hap_status fake_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status fake_write(void *self, const hap_device_output *const wanted[],
+                             hap_device_output *const reached[])
 {
   fake_device *d = self;
-  double force = hapi_v3_norm(wanted->force);
-  bool good = hapi_finite(wanted->force, 3) && hapi_finite(wanted->torque, 3) &&
+  double force = hapi_v3_norm(wanted[0]->wrench.force);
+  bool good = hapi_finite(wanted[0]->wrench.force, 3) && hapi_finite(wanted[0]->wrench.torque, 3) &&
               (force <= d->info.max_force * (1.0 + 1e-12) || d->info.max_force == 0.0);
   bool first = atomic_exchange(&d->since_read, 0) == 1; /* one write after one read */
   atomic_fetch_add(&d->writes, 1);
   atomic_fetch_add(&d->wrong, !good || !first || atomic_load(&d->running) != 1);
-  *reached = *wanted;
+  reached[0]->wrench = wanted[0]->wrench;
   if (atomic_load(&d->fail_write) != 0) {
     return HAP_ERROR_DEVICE;
   }
   if (d->push != NULL) {
-    d->push(d, wanted, reached);
+    d->push(d, &wanted[0]->wrench, &reached[0]->wrench);
   }
   atomic_fetch_add(&d->steep, !(fabs(force - d->written) <= 5.0 * (1.0 + 1e-9)));
   d->written = force;

@@ -54,17 +54,18 @@ typedef struct felt_book {
 static felt_book felt;
 static atomic_int felt_let_go; /* by zero, of any thread, since the last write */
 
-static inline hap_status felt_open(const char *args, void **self, hap_detail *detail)
+static inline hap_status felt_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   felt.hand = hapi_registry_find("virtual", 7);
   *self = &felt;
-  return felt.hand->open(args, &felt.self, detail);
+  return felt.hand->open(NULL, args, &felt.self, detail);
 }
 
-static inline void felt_describe(void *self, hap_device_info *out)
+static inline void felt_describe(void *self, uint32_t effector, hap_device_info *out)
 {
   (void)self;
-  felt.hand->describe(felt.self, out);
+  felt.hand->describe(felt.self, effector, out);
 }
 
 static inline hap_status felt_start(void *self)
@@ -99,9 +100,9 @@ static inline void felt_move(const double at[3])
   hapi_v3_copy(at, felt.at);
 }
 
-static inline hap_status felt_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                                   uint32_t *buttons)
+static inline hap_status felt_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   int block_ms = atomic_exchange(&felt.block_ms, 0);
   (void)self;
   if (block_ms > 0) {
@@ -110,12 +111,12 @@ static inline hap_status felt_read(void *self, int64_t time_ns, hap_pose *pose, 
   if (atomic_load(&felt.lost) != 0) {
     return HAP_ERROR_DEVICE;
   }
-  hap_status status = felt.hand->read(felt.self, time_ns, pose, twist, buttons);
-  felt_move(pose->position);
-  pose->position[0] += felt.jump;
-  twist->linear[0] += felt.fast ? 500.0 : 0.0;
+  hap_status status = felt.hand->read(felt.self, time_ns, out);
+  felt_move(in->pose.position);
+  in->pose.position[0] += felt.jump;
+  in->twist.linear[0] += felt.fast ? 500.0 : 0.0;
   if (atomic_load(&felt.bad_pose) != 0) {
-    pose->position[1] = (double)NAN;
+    in->pose.position[1] = (double)NAN;
   }
   return atomic_load(&felt.fail_read) != 0 ? HAP_ERROR_DEVICE : status;
 }
@@ -131,7 +132,8 @@ static inline void felt_hold(const double force[3])
   }
 }
 
-static inline hap_status felt_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static inline hap_status felt_write(void *self, const hap_device_output *const wanted[],
+                                    hap_device_output *const reached[])
 {
   double change[3];
   (void)self;
@@ -139,15 +141,15 @@ static inline hap_status felt_write(void *self, const hap_wrench *wanted, hap_wr
     return HAP_ERROR_DEVICE;
   }
   felt_drop();
-  hapi_v3_sub(wanted->force, felt.force, change);
-  double force = hapi_v3_norm(wanted->force);
+  hapi_v3_sub(wanted[0]->wrench.force, felt.force, change);
+  double force = hapi_v3_norm(wanted[0]->wrench.force);
   double step = hapi_v3_norm(change);
   /* Also when it is NaN. */
   felt.bad += !(force <= FELT_LIMIT * (1.0 + 1e-9) && step <= FELT_STEP * (1.0 + 1e-9));
   felt.peak = fmax(felt.peak, force);
   felt.steepest = fmax(felt.steepest, step);
   ++felt.writes;
-  felt_hold(wanted->force);
+  felt_hold(wanted[0]->wrench.force);
   return felt.hand->write(felt.self, wanted, reached);
 }
 

@@ -22,8 +22,9 @@ static int opens;
 
 static hap_status open_gives; /* to "quiet", "full" and "none" */
 
-static hap_status counted_open(const char *args, void **self, hap_detail *detail)
+static hap_status counted_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   ++opens;
   if (strcmp(args, "full") == 0) {
     memset(detail->text, 'x', sizeof detail->text); /* no end */
@@ -184,6 +185,87 @@ TEST(bad_info_closes_again)
     fakes[0].info.quantum = wrong[i];
     CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE && fakes[0].closes == 1);
   }
+}
+
+/* One axis, a gripper; what is not right about it and the rest is set by the test. */
+static hap_axis_info fake_axis;
+
+static void fake_describe_axis(void *self, uint32_t effector, uint32_t axis, hap_axis_info *out)
+{
+  (void)self;
+  *out = fake_axis;
+  out->high += 10.0 * effector + axis;
+}
+
+static hap_device_ops many_ops(void)
+{
+  hap_device_ops ops = counted_ops();
+  ops.describe_axis = fake_describe_axis;
+  fakes[0].info.effector_count = HAP_EFFECTORS_MAX;
+  fakes[0].info.axis_count = HAP_AXES_MAX;
+  fakes[0].info.button_count = fakes[0].info.led_count = 32;
+  fakes[0].info.vibrator_count = HAP_VIBRATORS_MAX;
+  fakes[0].info.workspace_low[1] = -0.1;
+  fakes[0].info.workspace_high[1] = 0.2;
+  fake_axis = (hap_axis_info){.kind = HAP_AXIS_GRIPPER, .high = 1.0, .max_force = 8.0};
+  return ops;
+}
+
+TEST(end_effectors_and_axes_are_told)
+{
+  hap_device *device = NULL;
+  hap_device_info info;
+  hap_axis_info axis;
+  hap_device_ops ops = many_ops();
+  REQUIRE(open_fake(&ops, &device) == HAP_OK);
+  for (uint32_t i = 0; i < HAP_EFFECTORS_MAX; ++i) {
+    CHECK(hap_device_get_effector(device, i, &info, sizeof info) == HAP_OK);
+    CHECK(info.effector_count == HAP_EFFECTORS_MAX && info.pacing == HAP_PACING_VIRTUAL);
+    CHECK(info.workspace_low[1] == -0.1 && info.workspace_high[1] == 0.2);
+    CHECK(hap_device_get_axis(device, i, 7, &axis, sizeof axis) == HAP_OK);
+    CHECK(axis.size == sizeof axis && axis.kind == HAP_AXIS_GRIPPER && axis.max_force == 8.0);
+    CHECK_NEAR(axis.high, 1.0 + 10.0 * i + 7.0, 0.0);
+  }
+  CHECK(hap_device_get_effector(device, HAP_EFFECTORS_MAX, &info, sizeof info) ==
+        HAP_ERROR_NOT_FOUND);
+  CHECK(hap_device_get_axis(device, 0, HAP_AXES_MAX, &axis, sizeof axis) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_device_get_axis(device, HAP_EFFECTORS_MAX, 0, &axis, sizeof axis) ==
+        HAP_ERROR_NOT_FOUND);
+  CHECK(hap_device_get_effector(NULL, 0, &info, sizeof info) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_device_get_axis(NULL, 0, 0, &axis, sizeof axis) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_device_get_axis(device, 0, 0, NULL, sizeof axis) == HAP_ERROR_ARGUMENT);
+  hap_device_close(device);
+  ops = counted_ops(); /* one that says nothing of it has one */
+  REQUIRE(open_fake(&ops, &device) == HAP_OK);
+  CHECK(hap_device_get_info(device, &info, sizeof info) == HAP_OK && info.effector_count == 1);
+  CHECK(hap_device_get_axis(device, 0, 0, &axis, sizeof axis) == HAP_ERROR_NOT_FOUND);
+  hap_device_close(device);
+}
+
+TEST(too_many_of_anything_and_bad_axes_are_refused)
+{
+  hap_device *device = NULL;
+  for (int i = 0; i < 14; ++i) {
+    hap_device_ops ops = many_ops();
+    hap_device_info *info = &fakes[0].info;
+    info->effector_count += i == 0;
+    info->axis_count += i == 1;
+    info->button_count += i == 2;
+    info->led_count += i == 3;
+    info->vibrator_count += i == 4;
+    info->workspace_low[2] = i == 5 ? 0.01 : 0.0;
+    info->workspace_high[0] = i == 6 ? (double)NAN : 0.0;
+    info->vibrator_hz[1] = i == 7 ? -1.0 : 0.0;
+    ops.describe_axis = i == 8 ? NULL : ops.describe_axis;
+    fake_axis.low = i == 9 ? 100.0 : i == 10 ? (double)NAN : 0.0;
+    fake_axis.max_force = i == 11 ? -1.0 : 0.0;
+    fake_axis.kind += i == 12;
+    fake_axis.unit += i == 13 ? 3 : 0;
+    CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE && fakes[0].closes == 1);
+  }
+  hap_device_ops ops = many_ops(); /* a table that ends before the operation */
+  ops.size = (uint32_t)offsetof(hap_device_ops, describe_axis);
+  CHECK(open_fake(&ops, &device) == HAP_ERROR_DEVICE);
 }
 
 TEST(failed_open_keeps_its_text)

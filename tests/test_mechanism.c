@@ -12,6 +12,7 @@
 #include <hapode/hapode.h>
 
 #include "base/vec.h"
+#include "device/one_effector.h"
 #include "tests/device_rig.h"
 
 #define MS 1000000LL
@@ -19,7 +20,7 @@
 static double rig_read(device_rig *r, int64_t since_ns)
 {
   uint32_t buttons = 0;
-  CHECK(r->ops->read(r->self, 7000 + since_ns, &r->pose, &r->twist, &buttons) == HAP_OK);
+  CHECK(hapi_one_read(r->ops, r->self, 7000 + since_ns, &r->pose, &r->twist, &buttons) == HAP_OK);
   hapi_virtual_get_port(r->self, &r->port);
   return r->pose.position[0];
 }
@@ -28,7 +29,7 @@ static void rig_push(device_rig *r, double x, double y)
 {
   hap_wrench wanted = {{x, y, 0.0}, {0.0, 0.0, 0.0}};
   hap_wrench reached;
-  CHECK(r->ops->write(r->self, &wanted, &reached) == HAP_OK);
+  CHECK(hapi_one_write(r->ops, r->self, &wanted, &reached) == HAP_OK);
 }
 
 TEST(device_alone_has_mass_and_damping)

@@ -143,9 +143,9 @@ TEST(wrong_tables_are_refused)
     hap_status status;
     const char *said[3];
   } cases[] = {
-      {"abi_is_new", HAP_ERROR_UNSUPPORTED, {"device ABI 3", "has 2", "newer library"}},
-      {"abi_is_old", HAP_ERROR_UNSUPPORTED, {"device ABI 1", "has 2", "build it anew"}},
-      {"refuses", HAP_ERROR_UNSUPPORTED, {"refuses device ABI 2", "build it anew", NULL}},
+      {"abi_is_new", HAP_ERROR_UNSUPPORTED, {"device ABI 4", "has 3", "newer library"}},
+      {"abi_is_old", HAP_ERROR_UNSUPPORTED, {"device ABI 2", "has 3", "build it anew"}},
+      {"refuses", HAP_ERROR_UNSUPPORTED, {"refuses device ABI 3", "build it anew", NULL}},
       {"size_is_small", HAP_ERROR_UNSUPPORTED, {"40 bytes", "sizeof(hap_device_ops)", NULL}},
       {"no_name", HAP_ERROR_DEVICE, {"name is missing", NULL}},
       {"name_is_bad", HAP_ERROR_DEVICE, {"name", "[a-z0-9_-]", NULL}},

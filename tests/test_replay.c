@@ -16,6 +16,7 @@
 #include <hapode/hapode.h>
 
 #include "base/vec.h"
+#include "device/one_effector.h"
 #include "tests/device_rig.h"
 
 #define PI 3.14159265358979323846
@@ -50,7 +51,7 @@ static hap_status replay_try(const char *path, const char *arguments, hap_detail
 static void rig_read(device_rig *r, int64_t since_ns)
 {
   uint32_t buttons = 77;
-  CHECK(r->ops->read(r->self, T0 + since_ns, &r->pose, &r->twist, &buttons) == HAP_OK);
+  CHECK(hapi_one_read(r->ops, r->self, T0 + since_ns, &r->pose, &r->twist, &buttons) == HAP_OK);
   CHECK(buttons == 0);
 }
 
@@ -109,7 +110,7 @@ TEST(ends_are_at_rest)
   rig_read(r, 3600000000000);
   CHECK(r->pose.position[0] == 3.0 && r->twist.linear[0] == 0.0);
   uint32_t buttons;
-  CHECK(r->ops->read(r->self, T0, &r->pose, &r->twist, &buttons) == HAP_ERROR_ARGUMENT);
+  CHECK(hapi_one_read(r->ops, r->self, T0, &r->pose, &r->twist, &buttons) == HAP_ERROR_ARGUMENT);
   rig_restart(r);
   CHECK(r->pose.position[0] == 1.0);
 }

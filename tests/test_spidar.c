@@ -16,6 +16,7 @@
 #include "base/safety.h"
 #include "base/vec.h"
 #include "device/device.h"
+#include "device/one_effector.h"
 #include "plugins/spidar/spidar.h"
 #include "tests/spidar_rig.h"
 #include "tools/rig.h"
@@ -46,7 +47,7 @@ static hap_status read_once(hands *h)
 {
   hap_twist twist;
   uint32_t buttons;
-  return h->ops->read(h->self, hapi_clock_now(), &h->pose, &twist, &buttons);
+  return hapi_one_read(h->ops, h->self, hapi_clock_now(), &h->pose, &twist, &buttons);
 }
 
 /* Ticks with that force; the first error, or HAP_OK. */
@@ -58,7 +59,7 @@ static hap_status hands_push(hands *h, double x, int ticks)
     hapi_clock_sleep_until(hapi_clock_now() + 1000000);
     hap_status status = read_once(h);
     if (status >= HAP_OK) {
-      status = h->ops->write(h->self, &wanted, &reached);
+      status = hapi_one_write(h->ops, h->self, &wanted, &reached);
     }
     if (status < HAP_OK) {
       return status;
@@ -226,7 +227,7 @@ TEST(the_hand_feels_what_was_reached)
   REQUIRE(open_device(&h, ",timeout=5,rotate=1/0/0/0", &detail));
   REQUIRE(h.ops->start(h.self) == HAP_OK);
   CHECK(hands_push(&h, 2.0, 1500) == HAP_OK);
-  h.ops->held(h.self, &held);
+  hapi_one_held(h.ops, h.self, &held);
   CHECK_NEAR(held.force[0], 1.91, 0.05); /* not all that was wanted, and said so */
   REQUIRE(emulated_state(&machine, "force", force, 3));
   CHECK_NEAR(force[0], held.force[0], 0.15);
@@ -235,7 +236,7 @@ TEST(the_hand_feels_what_was_reached)
   CHECK(hands_push(&h, 0.0, 10) == HAP_OK);
   h.ops->zero(h.self);
   CHECK(emulated_await(&machine, true));
-  h.ops->held(h.self, &held);
+  hapi_one_held(h.ops, h.self, &held);
   CHECK(hapi_v3_norm(held.force) == 0.0);
   CHECK(hands_push(&h, 2.0, 10) == HAP_OK);
   CHECK(emulated_await(&machine, false));

@@ -12,6 +12,7 @@
 
 #include "base/safety.h"
 #include "base/vec.h"
+#include "device/one_effector.h"
 #include "plugins/spidar/spidar.h"
 #include "tools/spidar-emulator/driven.h"
 
@@ -85,7 +86,7 @@ static rig *rig_at(const char *path)
   hap_detail detail = {""};
   rig *r = tap_own(sizeof *r, rig_end);
   r->ops = &driven_spidar_ops;
-  REQUIRE(r->ops->open(path, &self, &detail) == HAP_OK);
+  REQUIRE(r->ops->open(NULL, path, &self, &detail) == HAP_OK);
   r->driven = self;
   r->device = &r->driven->device;
   REQUIRE(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) == 0);
@@ -126,7 +127,7 @@ static hap_status rig_read(rig *r)
   hap_twist twist;
   uint32_t buttons = 7;
   r->time_ns += TICK_NS;
-  hap_status status = r->ops->read(r->driven, r->time_ns, &pose, &twist, &buttons);
+  hap_status status = hapi_one_read(r->ops, r->driven, r->time_ns, &pose, &twist, &buttons);
   CHECK(status < HAP_OK || buttons == 0);
   return status;
 }
@@ -135,7 +136,7 @@ static hap_status rig_write(rig *r, double x)
 {
   const hap_wrench wanted = {{x, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hap_wrench reached;
-  return r->ops->write(r->driven, &wanted, &reached);
+  return hapi_one_write(r->ops, r->driven, &wanted, &reached);
 }
 
 /* Reads and writes; how many ticks were good. *out: what ended them. */
@@ -286,7 +287,7 @@ TEST(the_delay_is_that_of_the_commands)
   rig *r = rig_new();
   hap_device_info info = {.mass = 0.0};
   r->device->zero_count = HAPI_SPIDAR_ZEROS_BEFORE + 74;
-  r->ops->describe(r->driven, &info);
+  r->ops->describe(r->driven, 0, &info);
   CHECK_NEAR(info.delay, 1e-3 + 74 * 10 / 2e6, 1e-12);
 }
 
@@ -302,10 +303,10 @@ TEST(nothing_but_numbers_becomes_currents)
     hap_wrench reached;
     CHECK(rig_push(r, 2.0, 10, &status) == 10 && zeros_come(r) == 0);
     (i < 3 ? wanted.force : wanted.torque)[i % 3] = wrong[i % 3];
-    CHECK(r->ops->write(r->driven, &wanted, &reached) == HAP_ERROR_ARGUMENT);
+    CHECK(hapi_one_write(r->ops, r->driven, &wanted, &reached) == HAP_ERROR_ARGUMENT);
     CHECK(zeros_come(r) == ZEROS && atomic_load(&r->device->zeroed));
     CHECK(!atomic_load(&r->device->guard.pulse->pulling));
-    r->ops->held(r->driven, &reached);
+    hapi_one_held(r->ops, r->driven, &reached);
     CHECK(hapi_v3_norm(reached.force) == 0.0);
     tap_release(r);
   }
@@ -321,14 +322,14 @@ TEST(more_than_the_limit_is_shortened_and_said)
   const hap_wrench torque = {{0.0, 0.0, 0.0}, {0.0, 3.0 * turn, 0.0}};
   for (int i = 0; i < 10; ++i) { /* before the hand yields */
     CHECK(rig_read(r) >= HAP_OK);
-    CHECK(r->ops->write(r->driven, &force, &reached) == HAP_SATURATED);
+    CHECK(hapi_one_write(r->ops, r->driven, &force, &reached) == HAP_SATURATED);
   }
   CHECK_NEAR(hapi_v3_norm(reached.force), most, 0.1 * most);
   CHECK(hapi_v3_norm(reached.force) <= most * (1.0 + 1e-9));
   r = rig_start();
   for (int i = 0; i < 10; ++i) {
     CHECK(rig_read(r) >= HAP_OK);
-    CHECK(r->ops->write(r->driven, &torque, &reached) == HAP_SATURATED);
+    CHECK(hapi_one_write(r->ops, r->driven, &torque, &reached) == HAP_SATURATED);
   }
   CHECK_NEAR(hapi_v3_norm(reached.torque), turn, 0.1 * turn);
   CHECK(hapi_v3_norm(reached.torque) <= turn * (1.0 + 1e-9));
@@ -341,23 +342,24 @@ TEST(no_force_is_told_where_none_is_wanted)
   hap_status status = HAP_OK;
   rig *r = rig_start();
   CHECK(rig_push(r, 0.0, 50, &status) == 50);
-  r->ops->held(r->driven, &held);
+  hapi_one_held(r->ops, r->driven, &held);
   CHECK(hapi_v3_norm(held.force) == 0.0 && hapi_v3_norm(held.torque) == 0.0);
   double little = 0.009 * r->device->settings.max_force;
   CHECK(rig_push(r, little, 50, &status) == 50);
-  r->ops->held(r->driven, &held);
+  hapi_one_held(r->ops, r->driven, &held);
   CHECK_NEAR(held.force[0], little, 0.5 * little);
   /* Away from home the least tensions leave more, up to a hundredth of the limit. */
   const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hap_wrench given;
   hap_pose *pose = &r->device->belief.solver.pose;
   pose->position[0] = 0.022;
-  CHECK(r->ops->write(r->driven, &none, &held) >= HAP_OK && hapi_v3_norm(held.force) == 0.0);
+  CHECK(hapi_one_write(r->ops, r->driven, &none, &held) >= HAP_OK &&
+        hapi_v3_norm(held.force) == 0.0);
   hapi_spidar_wrench(&r->device->model, pose, r->device->tensions.tension, &given);
   CHECK(hapi_v3_norm(given.force) > 0.003 * r->device->settings.max_force);
   /* A geometry in which they do not balance is told: as if the pose were far from home. */
   pose->position[0] = 0.03;
-  CHECK(r->ops->write(r->driven, &none, &held) >= HAP_OK);
+  CHECK(hapi_one_write(r->ops, r->driven, &none, &held) >= HAP_OK);
   CHECK(hapi_v3_norm(held.force) > 0.01 * r->device->settings.max_force);
 }
 
@@ -456,7 +458,7 @@ TEST(a_stop_sends_zeros_twice_and_leaves_the_guard_nothing_to_do)
   hapi_spidar_ops.stop(r->device);
   CHECK(zeros_come(r) == 2 * ZEROS && !r->device->running);
   CHECK(!atomic_load(&r->device->guard.pulse->pulling));
-  hapi_spidar_ops.held(r->device, &held);
+  hapi_one_held(&hapi_spidar_ops, r->device, &held);
   CHECK(hapi_v3_norm(held.force) == 0.0 && hapi_v3_norm(held.torque) == 0.0);
 }
 

@@ -12,6 +12,7 @@
 #include <hapode/hapode.h>
 
 #include "base/vec.h"
+#include "device/one_effector.h"
 #include "tests/device_rig.h"
 
 #define PI 3.14159265358979323846
@@ -20,7 +21,7 @@
 static hap_status rig_read(device_rig *r, int64_t since_ns)
 {
   uint32_t buttons = 77;
-  hap_status status = r->ops->read(r->self, T0 + since_ns, &r->pose, &r->twist, &buttons);
+  hap_status status = hapi_one_read(r->ops, r->self, T0 + since_ns, &r->pose, &r->twist, &buttons);
   CHECK(status < 0 || buttons == 0);
   return status;
 }
@@ -28,7 +29,7 @@ static hap_status rig_read(device_rig *r, int64_t since_ns)
 static hap_status rig_push(device_rig *r, double x, double y, double z)
 {
   hap_wrench wanted = {{x, y, z}, {0.0, 0.0, 0.0}};
-  return r->ops->write(r->self, &wanted, &r->reached);
+  return hapi_one_write(r->ops, r->self, &wanted, &r->reached);
 }
 
 /* x of a default read, NaN on failure */
@@ -393,12 +394,12 @@ TEST(a_wrist_gives_way_to_a_torque)
       rig_new("virtual:dof=6,hand=tense,inertia=0.002,turn_damping=0.1,turn_stiffness=3");
   REQUIRE(r != NULL);
   CHECK(rig_read(r, 0) == HAP_OK);
-  CHECK(r->ops->write(r->self, &twist, &r->reached) == HAP_OK);
+  CHECK(hapi_one_write(r->ops, r->self, &twist, &r->reached) == HAP_OK);
   CHECK(rig_read(r, 100000) == HAP_OK);
   CHECK_NEAR(r->twist.angular[2], 0.3 * 1e-4 / 0.002, 0.01 * 0.3 * 1e-4 / 0.002);
   for (int i = 1; i <= 3000; ++i) {
     CHECK(rig_read(r, 100000 + 1000000LL * i) == HAP_OK);
-    CHECK(r->ops->write(r->self, &twist, &r->reached) == HAP_OK);
+    CHECK(hapi_one_write(r->ops, r->self, &twist, &r->reached) == HAP_OK);
   }
   CHECK_NEAR(2.0 * asin(r->pose.quat_wxyz[3]), 0.1, 1e-6);
   CHECK_NEAR(hapi_v3_norm(r->pose.position), 0.0, 1e-12); /* a torque moves nothing along */
@@ -417,7 +418,7 @@ TEST(turning_does_the_work_of_the_torque)
     double before[3];
     hapi_virtual_get_port(r->self, &port);
     hapi_v3_copy(r->twist.angular, before);
-    CHECK(r->ops->write(r->self, &twist, &r->reached) == HAP_OK);
+    CHECK(hapi_one_write(r->ops, r->self, &twist, &r->reached) == HAP_OK);
     CHECK(rig_read(r, 1000000LL * i) == HAP_OK);
     hapi_v3_add(before, r->twist.angular, before);
     work += 0.5 * 1e-3 * hapi_v3_dot(port.torque, before); /* to the order of a delayed tick */
@@ -437,13 +438,14 @@ TEST(force_is_limited)
   CHECK_NEAR(r->reached.force[0], 3.0, 1e-14);
   CHECK_NEAR(r->reached.force[2], 4.0, 1e-14);
   hap_wrench twist = {{1.0, 0.0, 0.0}, {0.1, 0.0, 0.0}};
-  CHECK(r->ops->write(r->self, &twist, &r->reached) == HAP_OK);
+  CHECK(hapi_one_write(r->ops, r->self, &twist, &r->reached) == HAP_OK);
   CHECK(r->reached.force[0] == 1.0 && r->reached.torque[0] == 0.0); /* three degrees of freedom */
   CHECK(rig_push(r, (double)NAN, 0.0, 0.0) == HAP_ERROR_ARGUMENT);
   r = rig_new("virtual:dof=6");
-  CHECK(r->ops->write(r->self, &twist, &r->reached) == HAP_OK && r->reached.torque[0] == 0.1);
+  CHECK(hapi_one_write(r->ops, r->self, &twist, &r->reached) == HAP_OK &&
+        r->reached.torque[0] == 0.1);
   twist.torque[0] = 3.0;
-  CHECK(r->ops->write(r->self, &twist, &r->reached) == HAP_SATURATED);
+  CHECK(hapi_one_write(r->ops, r->self, &twist, &r->reached) == HAP_SATURATED);
   CHECK_NEAR(r->reached.torque[0], 1.0, 1e-15);
 }
 

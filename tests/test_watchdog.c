@@ -65,8 +65,9 @@ static void call_block(stuck_device *d, atomic_int *block)
   }
 }
 
-static hap_status stuck_open(const char *args, void **self, hap_detail *detail)
+static hap_status stuck_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   stuck_device *d = &devices[opened++];
   (void)detail;
   memset(d, 0, sizeof *d);
@@ -75,8 +76,9 @@ static hap_status stuck_open(const char *args, void **self, hap_detail *detail)
   return HAP_OK;
 }
 
-static void stuck_describe(void *self, hap_device_info *out)
+static void stuck_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   const stuck_device *d = self;
   out->dof = 3;
   out->max_force = 12.0;
@@ -89,9 +91,9 @@ static hap_status stuck_start(void *self)
   return HAP_OK;
 }
 
-static hap_status stuck_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                             uint32_t *buttons)
+static hap_status stuck_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   stuck_device *d = self;
   (void)time_ns;
   if (atomic_load(&d->read_ms) > 0) {
@@ -101,22 +103,23 @@ static hap_status stuck_read(void *self, int64_t time_ns, hap_pose *pose, hap_tw
     atomic_store(&d->longest_ns, spent_ns > d->longest_ns ? spent_ns : d->longest_ns);
   }
   call_block(d, &d->block_read);
-  *pose = (hap_pose){{DEPTH_X, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  memset(twist, 0, sizeof *twist);
-  *buttons = 0;
+  in->pose = (hap_pose){{DEPTH_X, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  memset(&in->twist, 0, sizeof in->twist);
+  in->buttons = 0;
   return HAP_OK;
 }
 
-static hap_status stuck_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status stuck_write(void *self, const hap_device_output *const wanted[],
+                              hap_device_output *const reached[])
 {
   stuck_device *d = self;
-  bool force = wanted->force[0] != 0.0;
+  bool force = wanted[0]->wrench.force[0] != 0.0;
   if (force) {
     call_block(d, &d->block_write);
   }
   atomic_store(&d->holds, force);
   atomic_fetch_add(&d->forces, force);
-  *reached = *wanted;
+  reached[0]->wrench = wanted[0]->wrench;
   return HAP_OK;
 }
 

@@ -59,17 +59,14 @@ static hap_status take_identity(const char *path, hap_device *device, hap_detail
 static void place_device(const hap_device *device, const char *hand, hap_pose *out)
 {
   hap_device *scenes_own = NULL;
-  hap_twist twist;
-  uint32_t buttons;
   if (hapi_device_ops(device)->pacing == HAP_PACING_VIRTUAL || hand == NULL ||
       hap_device_open(hand, &scenes_own, NULL) < HAP_OK) {
     return;
   }
   const hap_device_ops *ops = hapi_device_ops(scenes_own);
   void *self = hapi_device_self(scenes_own);
-  hap_pose pose;
-  if (ops->start(self) >= HAP_OK && ops->read(self, 0, &pose, &twist, &buttons) >= HAP_OK) {
-    memcpy(out->position, pose.position, sizeof out->position);
+  if (ops->start(self) >= HAP_OK && hapi_device_read(scenes_own, 0) >= HAP_OK) {
+    memcpy(out->position, scenes_own->effectors[0].input.pose.position, sizeof out->position);
   }
   ops->stop(self);
   hap_device_close(scenes_own);

@@ -12,6 +12,7 @@
 #include "base/log.h"
 #include "base/vec.h"
 #include "device/device.h"
+#include "device/one_effector.h"
 #include "plugins/spidar/spidar.h"
 #include "tools/run_loop.h"
 
@@ -111,8 +112,8 @@ static bool hold_taut(const session *s)
   hap_twist twist;
   uint32_t buttons;
   int64_t now_ns = hapi_clock_now();
-  (void)s->ops->read(s->spidar, now_ns, &pose, &twist, &buttons);
-  (void)s->ops->write(s->spidar, &none, &reached);
+  (void)hapi_one_read(s->ops, s->spidar, now_ns, &pose, &twist, &buttons);
+  (void)hapi_one_write(s->ops, s->spidar, &none, &reached);
   hapi_clock_sleep_until(now_ns + TICK_NS);
   return !is_lost(s);
 }

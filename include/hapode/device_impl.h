@@ -26,7 +26,7 @@
 HAP_BEGIN_DECLS
 
 /* Goes up when a member of hap_device_ops changes its meaning. */
-#define HAP_DEVICE_ABI 2u
+#define HAP_DEVICE_ABI 3u
 
 /* Who sets the pace of the loop. Values are never renumbered. */
 typedef enum hap_device_pacing {
@@ -35,7 +35,35 @@ typedef enum hap_device_pacing {
   HAP_PACING_DEVICE = 2   /* read blocks until the device's own tick, at most two ticks */
 } hap_device_pacing;
 
-/* The operations of a device. It has a size and may grow at its end. */
+/* What an end effector measures. It has a size, set by the library, and may grow at its end. */
+typedef struct hap_device_input {
+  uint32_t size;
+  uint32_t buttons; /* bit 0 is the first one */
+  hap_pose pose;    /* in the device's frame; a device of dof 3 gives a constant quaternion */
+  hap_twist twist;
+  double axes[HAP_AXES_MAX];       /* as many as axis_count says, in the units of hap_axis_info */
+  double axis_rates[HAP_AXES_MAX]; /* of those, a second */
+} hap_device_input;
+
+/* What an end effector shall do, or does. It has a size, set by the library, and may grow at its
+ * end. */
+typedef struct hap_device_output {
+  uint32_t size;
+  uint32_t leds;                    /* bit 0 is the first one */
+  hap_wrench wrench;                /* on the hand, in the device's frame */
+  double axis_forces[HAP_AXES_MAX]; /* on the hand: positive ones open a gripper */
+  hap_vibration vibrators[HAP_VIBRATORS_MAX];
+} hap_device_output;
+
+/* Whether a struct of this build's headers, from a library of maybe another one, has the member. */
+#define HAP_HAS_MEMBER(object, member) \
+  ((object)->size >= (size_t)((const char *)(&(object)->member + 1) - (const char *)(object)))
+
+/* The operations of a device. It has a size and may grow at its end.
+ *
+ * What read, write and held pass are arrays of pointers: one for each end effector, in their
+ * order. A device with one end effector uses the first. A library of an older build passes shorter
+ * structs: members that this header calls newer than ABI 3 are asked for with HAP_HAS_MEMBER. */
 typedef struct hap_device_ops {
   uint32_t abi;     /* HAP_DEVICE_ABI; checked before any other member */
   uint32_t size;    /* sizeof(hap_device_ops) of the device's build */
@@ -43,23 +71,24 @@ typedef struct hap_device_ops {
   const char *help; /* one line: what it is and its arguments */
   uint32_t pacing;  /* hap_device_pacing */
 
-  /* May block, may allocate. args is the text after "name:" or "", and is not kept. An argument
-   * that is not understood is refused. No force yet. On success *self is not NULL. On failure it
-   * stays NULL, detail (never NULL) says why, and nothing is left open. */
-  hap_status (*open)(const char *args, void **self, hap_detail *detail);
+  /* May block, may allocate. context is that of hap_device_create; NULL for a module. args is the
+   * text after "name:" or "", and is not kept. An argument that is not understood is refused. No
+   * force yet. On success *self is not NULL. On failure it stays NULL, detail (never NULL) says
+   * why, and nothing is left open. */
+  hap_status (*open)(void *context, const char *args, void **self, hap_detail *detail);
 
-  /* Fills *out, which arrives zeroed but for its size: no member beyond out->size is written. name
-   * may be left empty. The same at every call. Never fails, never blocks. */
-  void (*describe)(void *self, hap_device_info *out);
+  /* Fills *out for an end effector, from 0; *out arrives zeroed but for its size, and no member
+   * beyond out->size is written. name may be left empty, and effector_count 0 stands for 1. The
+   * same at every call. Never fails, never blocks. */
+  void (*describe)(void *self, uint32_t effector, hap_device_info *out);
 
   /* Energises the device with zero force. May block. Also after stop, and after the device was
    * lost: what must be opened anew is opened here. */
   hap_status (*start)(void *self);
 
-  /* Pose and twist of the end effector in the device's frame at time_ns (pacing DEVICE: not later
-   * than time_ns). buttons: bit 0 is the first one. Fills all outputs: the quaternion is unit, and
-   * a device of dof 3 gives a constant one. Never blocks except with pacing DEVICE, never
-   * allocates. HAP_ERROR_STATE before start and after stop.
+  /* All end effectors at time_ns (pacing DEVICE: not later than time_ns). Fills in buttons, pose
+   * and twist of each, and its axes; the quaternion is unit. Never blocks except with pacing
+   * DEVICE, never allocates. HAP_ERROR_STATE before start and after stop.
    *
    * HAP_STALE: the device does not believe what it measures, and the outputs are its last good
    * ones, carried on for a few ms. The session goes on with them, takes the force away over 18 ms
@@ -70,20 +99,21 @@ typedef struct hap_device_ops {
    * positive number that is no hap_status counts as an error, for write too. The session goes on
    * reading: a device that was unplugged may answer again, and is used again after
    * hap_session_reset_fault. start is called in between only by hap_pointer_restart. */
-  hap_status (*read)(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                     uint32_t *buttons);
+  hap_status (*read)(void *self, int64_t time_ns, hap_device_input *const out[]);
 
-  /* Wrench on the hand in the device's frame, held until the next write. Never blocks, never
-   * allocates. Beyond max_force or max_torque it is shortened, its direction kept:
-   * HAP_SATURATED. reached is what the device really gives; it is filled in unless the status is
-   * an error. A wrench that is not finite gives no force: HAP_ERROR_ARGUMENT, or a zero.
-   * HAP_ERROR_STATE before start and after stop: then nothing reaches the motors. */
-  hap_status (*write)(void *self, const hap_wrench *wanted, hap_wrench *reached);
+  /* What each end effector shall do until the next write. Never blocks, never allocates. A force or
+   * torque beyond max_force or max_torque is shortened, its direction kept, an axis force beyond
+   * its own likewise: HAP_SATURATED. The wrench and axis_forces of reached are what the device
+   * really gives, and are filled in unless the status is an error; the rest of reached is not
+   * looked at. What is not finite gives no force: HAP_ERROR_ARGUMENT, or a zero. HAP_ERROR_STATE
+   * before start and after stop: then nothing reaches the motors. */
+  hap_status (*write)(void *self, const hap_device_output *const wanted[],
+                      hap_device_output *const reached[]);
 
-  /* Zero force now. Any thread, also a signal handler, which may have interrupted any other
-   * function of the device: no lock, no allocation. From open to close at any time; idempotent;
-   * never fails. The force stays off until the next write. A write that is under way may come
-   * after it; the session then calls zero once more. */
+  /* Zero force now, of all end effectors, axes and vibrators. Any thread, also a signal handler,
+   * which may have interrupted any other function of the device: no lock, no allocation. From open
+   * to close at any time; idempotent; never fails. The force stays off until the next write. A
+   * write that is under way may come after it; the session then calls zero once more. */
   void (*zero)(void *self);
 
   /* De-energises: the force is off, also when zero was not called before. May block. A second stop
@@ -94,14 +124,19 @@ typedef struct hap_device_ops {
    * be gone when this returns. */
   void (*close)(void *self);
 
-  /* Optional, NULL or beyond size: what the motors were told last; zero where they are off.
-   * Called by the thread that writes, or when none does, from open to close. For checks. */
-  void (*held)(void *self, hap_wrench *out);
+  /* Optional, NULL or beyond size: what the motors were told last, wrench and axis_forces; zero
+   * where they are off. Called by the thread that writes, or when none does, from open to close.
+   * For checks. */
+  void (*held)(void *self, hap_device_output *const out[]);
 
   /* Optional, NULL or beyond size: why start, read or write failed last, in one sentence that says
    * what to do. out arrives empty and stays so when nothing failed. Any thread, from open to close,
    * at the same time as any other operation; never blocks. */
   void (*explain)(void *self, hap_detail *out);
+
+  /* For devices whose describe says axis_count: an axis of an end effector, both from 0. As
+   * describe. */
+  void (*describe_axis)(void *self, uint32_t effector, uint32_t axis, hap_axis_info *out);
 } hap_device_ops;
 
 /* [control] The one symbol of a loadable device, "module:/whole/path/of/it.so[,ARGS]". host_abi is

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "device/device.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -12,7 +13,9 @@
 #include "device/emergency.h"
 #include "device/module.h"
 
-#define FIGURE_MOST 1e9 /* of what a device says of itself, in SI units */
+#define FIGURE_MOST 1e9    /* of what a device says of itself, in SI units */
+#define AXIS_MOST 1e6      /* of the values of an axis */
+#define WORKSPACE_MOST 1e3 /* m */
 
 #define CLAIMED 1u
 #define CLOSED 2u
@@ -25,6 +28,9 @@ static bool name_is_good(const char *name)
 
 /* The table of a device that was built before the optional operations ends there. */
 #define SIZE_LEAST offsetof(hap_device_ops, held)
+
+/* Whether the table of the device's build has the member, and not NULL. */
+#define HAS_OPERATION(ops, member) (HAP_HAS_MEMBER(ops, member) && (ops)->member != NULL)
 
 static const char *missing_operation(const hap_device_ops *ops)
 {
@@ -92,6 +98,45 @@ bool hapi_device_figures_good(const double *figures, size_t count)
   return true;
 }
 
+/* Of what there can be so many. */
+static hap_status check_counts(const hap_device_ops *ops, const hap_device_info *info,
+                               hap_detail *detail)
+{
+  const struct {
+    const char *what;
+    uint32_t count;
+    uint32_t most;
+  } counts[] = {{"effector_count", info->effector_count, HAP_EFFECTORS_MAX},
+                {"axis_count", info->axis_count, HAP_AXES_MAX},
+                {"button_count", info->button_count, 32},
+                {"led_count", info->led_count, 32},
+                {"vibrator_count", info->vibrator_count, HAP_VIBRATORS_MAX}};
+  for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
+    if (counts[i].count > counts[i].most) {
+      return hapi_fail(detail, HAP_ERROR_DEVICE,
+                       "device '%s' says it has %s %u; there can be %u at most", ops->name,
+                       counts[i].what, counts[i].count, counts[i].most);
+    }
+  }
+  if (info->axis_count > 0 && !HAS_OPERATION(ops, describe_axis)) {
+    return hapi_fail(detail, HAP_ERROR_DEVICE,
+                     "device '%s' has axis_count %u: the operation 'describe_axis' is missing in "
+                     "its table",
+                     ops->name, info->axis_count);
+  }
+  return HAP_OK;
+}
+
+static bool box_is_good(const double low[3], const double high[3])
+{
+  bool good = true;
+  for (int i = 0; i < 3; ++i) {
+    good = good && fabs(low[i]) <= WORKSPACE_MOST && fabs(high[i]) <= WORKSPACE_MOST &&
+           low[i] <= high[i];
+  }
+  return good;
+}
+
 static hap_status check_info(const hap_device_ops *ops, const hap_device_info *info,
                              hap_detail *detail)
 {
@@ -99,8 +144,10 @@ static hap_status check_info(const hap_device_ops *ops, const hap_device_info *i
     return hapi_fail(detail, HAP_ERROR_DEVICE, "device '%s' says it has dof %u, known are 3 and 6",
                      ops->name, info->dof);
   }
-  const double figures[] = {info->max_force, info->max_torque, info->rated_stiffness, info->damping,
-                            info->quantum,   info->mass,       info->friction,        info->delay};
+  const double figures[] = {info->max_force,     info->max_torque, info->rated_stiffness,
+                            info->damping,       info->quantum,    info->mass,
+                            info->friction,      info->delay,      info->vibrator_hz[0],
+                            info->vibrator_hz[1]};
   if (!hapi_device_figures_good(figures, sizeof figures / sizeof figures[0])) {
     return hapi_fail(
         detail, HAP_ERROR_DEVICE,
@@ -108,20 +155,85 @@ static hap_status check_info(const hap_device_ops *ops, const hap_device_info *i
         "neither 0 nor from %g to %g",
         ops->name, HAPI_NUMBER_LEAST, FIGURE_MOST);
   }
+  if (!box_is_good(info->workspace_low, info->workspace_high)) {
+    return hapi_fail(detail, HAP_ERROR_DEVICE,
+                     "device '%s' has a workspace that is not finite, beyond %g m, or whose "
+                     "workspace_low is above workspace_high",
+                     ops->name, WORKSPACE_MOST);
+  }
+  return check_counts(ops, info, detail);
+}
+
+static hap_status check_axis(const hap_device_ops *ops, uint32_t index, const hap_axis_info *axis,
+                             hap_detail *detail)
+{
+  bool range = fabs(axis->low) <= AXIS_MOST && fabs(axis->high) <= AXIS_MOST &&
+               axis->high - axis->low >= HAPI_NUMBER_LEAST;
+  bool known = axis->kind <= HAP_AXIS_GRIPPER && axis->unit <= HAP_AXIS_SHARE;
+  if (!range || !known || !hapi_device_figures_good(&axis->max_force, 1)) {
+    return hapi_fail(detail, HAP_ERROR_DEVICE, "device '%s', axis %u: %s", ops->name, index,
+                     !known  ? "an unknown kind or unit; is the library older than the device?"
+                     : range ? "max_force is neither 0 nor from 1e-15 to 1e9"
+                             : "low and high are not finite, beyond 1e6, or not in this order");
+  }
+  return HAP_OK;
+}
+
+static void info_read(const hap_device *device, uint32_t effector, hap_device_info *out)
+{
+  memset(out, 0, sizeof *out);
+  out->size = sizeof *out;
+  device->ops->describe(device->self, effector, out);
+  out->size = sizeof *out;
+  out->pacing = device->ops->pacing;
+  out->effector_count = out->effector_count > 0 ? out->effector_count : 1;
+  out->name[sizeof out->name - 1] = '\0';
+  if (out->name[0] == '\0') {
+    snprintf(out->name, sizeof out->name, "%s", device->ops->name);
+  }
+}
+
+static hap_status effector_describe(hap_device *device, uint32_t index, hap_detail *detail)
+{
+  hapi_effector *effector = &device->effectors[index];
+  info_read(device, index, &effector->info);
+  HAPI_TRY(check_info(device->ops, &effector->info, detail));
+  if (effector->info.effector_count != device->effector_count) {
+    return hapi_fail(
+        detail, HAP_ERROR_DEVICE, "device '%s': effector_count is %u, and %u for end effector %u",
+        device->ops->name, device->effector_count, effector->info.effector_count, index);
+  }
+  for (uint32_t i = 0; i < effector->info.axis_count; ++i) {
+    hap_axis_info *axis = &effector->axes[i];
+    axis->size = sizeof *axis;
+    device->ops->describe_axis(device->self, index, i, axis);
+    axis->size = sizeof *axis;
+    HAPI_TRY(check_axis(device->ops, i, axis, detail));
+  }
+  effector->input.size = sizeof effector->input;
+  effector->input.pose.quat_wxyz[0] = 1.0;
+  effector->wanted.size = sizeof effector->wanted;
+  effector->reached.size = sizeof effector->reached;
+  device->inputs[index] = &effector->input;
+  device->wanted[index] = &effector->wanted;
+  device->reached[index] = &effector->reached;
   return HAP_OK;
 }
 
 static hap_status device_describe(hap_device *device, hap_detail *detail)
 {
-  hap_device_info *info = &device->info;
-  info->size = sizeof *info;
-  device->ops->describe(device->self, info);
-  info->size = sizeof *info;
-  info->name[sizeof info->name - 1] = '\0';
-  if (info->name[0] == '\0') {
-    snprintf(info->name, sizeof info->name, "%s", device->ops->name);
+  hap_device_info first;
+  info_read(device, 0, &first);
+  HAPI_TRY(check_info(device->ops, &first, detail));
+  device->effector_count = first.effector_count;
+  device->effectors = hapi_alloc_array(first.effector_count, sizeof *device->effectors);
+  if (device->effectors == NULL) {
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "device '%s': out of memory", device->ops->name);
   }
-  return check_info(device->ops, info, detail);
+  for (uint32_t i = 0; i < device->effector_count; ++i) {
+    HAPI_TRY(effector_describe(device, i, detail));
+  }
+  return HAP_OK;
 }
 
 /* The library last: the code of close is in it. */
@@ -130,6 +242,7 @@ static void device_free(hap_device *device)
   HAPI_ASSERT(device->self != NULL);
   void *library = device->library;
   device->ops->close(device->self);
+  hapi_free(device->effectors);
   hapi_free(device);
   hapi_module_unload(library);
 }
@@ -148,7 +261,7 @@ static hap_status fail_open(const hap_device_ops *ops, hap_status status, hap_de
 
 static hap_status open_self(hap_device *device, const char *args, hap_detail *detail)
 {
-  hap_status status = device->ops->open(args, &device->self, detail);
+  hap_status status = device->ops->open(NULL, args, &device->self, detail);
   if (status < 0) {
     return fail_open(device->ops, status, detail);
   }
@@ -238,8 +351,31 @@ void hap_device_close(hap_device *device)
 
 hap_status hap_device_get_info(const hap_device *device, hap_device_info *out, size_t size_of_out)
 {
-  return device != NULL ? hapi_struct_give(&device->info, sizeof device->info, out, size_of_out)
-                        : HAP_ERROR_ARGUMENT;
+  return hap_device_get_effector(device, 0, out, size_of_out);
+}
+
+hap_status hap_device_get_effector(const hap_device *device, uint32_t effector,
+                                   hap_device_info *out, size_t size_of_out)
+{
+  if (device == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  return effector < device->effector_count
+             ? hapi_struct_give(&device->effectors[effector].info, sizeof *out, out, size_of_out)
+             : HAP_ERROR_NOT_FOUND;
+}
+
+hap_status hap_device_get_axis(const hap_device *device, uint32_t effector, uint32_t axis,
+                               hap_axis_info *out, size_t size_of_out)
+{
+  if (device == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  bool there =
+      effector < device->effector_count && axis < device->effectors[effector].info.axis_count;
+  return there ? hapi_struct_give(&device->effectors[effector].axes[axis], sizeof *out, out,
+                                  size_of_out)
+               : HAP_ERROR_NOT_FOUND;
 }
 
 const hap_device_ops *hapi_device_ops(const hap_device *device)
@@ -254,14 +390,13 @@ void *hapi_device_self(const hap_device *device)
 
 const hap_device_info *hapi_device_info(const hap_device *device)
 {
-  return &device->info;
+  return &device->effectors[0].info;
 }
 
 void hapi_device_explain(const hap_device_ops *ops, void *self, hap_detail *out)
 {
   out->text[0] = '\0';
-  if (ops->size >= offsetof(hap_device_ops, explain) + sizeof ops->explain &&
-      ops->explain != NULL) {
+  if (HAS_OPERATION(ops, explain)) {
     ops->explain(self, out);
     out->text[sizeof out->text - 1] = '\0';
   }
@@ -270,8 +405,13 @@ void hapi_device_explain(const hap_device_ops *ops, void *self, hap_detail *out)
 bool hapi_device_claim(hap_device *device)
 {
   unsigned nobody = 0;
-  return atomic_compare_exchange_strong_explicit(&device->holders.bits, &nobody, CLAIMED,
-                                                 memory_order_acq_rel, memory_order_relaxed);
+  bool claimed = atomic_compare_exchange_strong_explicit(
+      &device->holders.bits, &nobody, CLAIMED, memory_order_acq_rel, memory_order_relaxed);
+  for (uint32_t i = 0; claimed && i < device->effector_count; ++i) {
+    hapi_effector *effector = &device->effectors[i];
+    effector->wanted = (hap_device_output){.size = sizeof effector->wanted};
+  }
+  return claimed;
 }
 
 void hapi_device_release(hap_device *device)

@@ -16,10 +16,24 @@ typedef struct hapi_device_holders {
   atomic_uint bits;
 } hapi_device_holders;
 
+/* What is known of an end effector is asked once, at open: the session may read it while the loop
+ * runs. The rest is the loop's. */
+typedef struct hapi_effector {
+  hap_device_info info;
+  hap_axis_info axes[HAP_AXES_MAX];
+  hap_device_input input;
+  hap_device_output wanted;
+  hap_device_output reached;
+} hapi_effector;
+
 struct hap_device {
   const hap_device_ops *ops;
   void *self;
-  hap_device_info info; /* asked once, at open: the session may read it while the loop runs */
+  uint32_t effector_count;
+  hapi_effector *effectors;
+  hap_device_input *inputs[HAP_EFFECTORS_MAX]; /* as the ops have them */
+  const hap_device_output *wanted[HAP_EFFECTORS_MAX];
+  hap_device_output *reached[HAP_EFFECTORS_MAX];
   hapi_device_holders holders;
   void *library; /* of module.h; NULL: built in */
 };
@@ -29,6 +43,18 @@ struct hap_device {
  * why it failed. */
 HAP_NODISCARD hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args,
                                               hap_device **out, hap_detail *detail);
+
+/* [haptic] Of all end effectors; what was read is in their input, what shall be written in their
+ * wanted. */
+static inline hap_status hapi_device_read(hap_device *device, int64_t time_ns)
+{
+  return device->ops->read(device->self, time_ns, device->inputs);
+}
+
+static inline hap_status hapi_device_write(hap_device *device)
+{
+  return device->ops->write(device->self, device->wanted, device->reached);
+}
 
 /* [any] For the calls of a session; self goes into each op. */
 const hap_device_ops *hapi_device_ops(const hap_device *device);
@@ -40,7 +66,7 @@ static inline bool hapi_device_did(hap_status status)
   return status >= HAP_OK && status <= HAP_DIVERGED;
 }
 
-/* [any] Lives as long as the device. */
+/* [any] Of the first end effector; lives as long as the device. */
 const hap_device_info *hapi_device_info(const hap_device *device);
 
 /* [any] Whether a device may describe itself with these: each is 0 (unknown) or from

@@ -38,7 +38,7 @@
 #define AXES 3
 
 typedef struct run {
-  const hap_device *device;
+  hap_device *device;
   const hap_identify_def *def;
   hap_detail *detail;
   double limit;         /* N */
@@ -84,8 +84,8 @@ static hap_status def_check(const hap_identify_def *def, double limit, hap_detai
 
 static hap_status run_fail(const run *r, const char *what)
 {
-  return hapi_fail(r->detail, HAP_ERROR_DEVICE, "device '%s', axis %c: %s", r->device->info.name,
-                   "xyz"[r->axis], what);
+  return hapi_fail(r->detail, HAP_ERROR_DEVICE, "device '%s', axis %c: %s",
+                   hapi_device_info(r->device)->name, "xyz"[r->axis], what);
 }
 
 /* The time of the next tick, when it has come. */
@@ -109,25 +109,21 @@ static int64_t await_tick(run *r)
 
 static hap_status read_device(run *r)
 {
-  const hap_device_ops *ops = r->device->ops;
-  hap_pose pose;
-  hap_twist twist;
-  uint32_t buttons = 0;
+  const double *position = r->device->effectors[0].input.pose.position;
   hapi_pulse_beat(&r->pulse, HAPI_PHASE_WAIT, 0);
   int64_t now_ns = await_tick(r);
-  memset(&pose, 0, sizeof pose);
   hapi_pulse_beat(&r->pulse, HAPI_PHASE_READ, 0);
-  if (!hapi_device_did(ops->read(r->device->self, now_ns, &pose, &twist, &buttons))) {
+  if (!hapi_device_did(hapi_device_read(r->device, now_ns))) {
     return run_fail(r, "it cannot be read");
   }
-  if (!hapi_finite(pose.position, 3)) {
+  if (!hapi_finite(position, 3)) {
     return run_fail(r, "its position is not finite");
   }
-  if (ops->pacing == HAP_PACING_DEVICE) {
+  if (r->device->ops->pacing == HAP_PACING_DEVICE) {
     now_ns = hapi_clock_now(); /* the read has waited */
   }
   r->time = (double)(now_ns - r->start_ns) / (double)HAPI_NS_PER_S;
-  hapi_v3_copy(pose.position, r->position);
+  hapi_v3_copy(position, r->position);
   return HAP_OK;
 }
 
@@ -185,15 +181,14 @@ static hap_status progress_tell(run *r)
 /* No force after hap_emergency_zero; one that was on its way meanwhile is taken off by the end. */
 static hap_status force_write(run *r, double force)
 {
-  hap_wrench wanted = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  hap_wrench reached;
-  wanted.force[r->axis] = force;
+  for (int i = 0; i < AXES; ++i) {
+    r->device->effectors[0].wanted.wrench.force[i] = i == r->axis ? force : 0.0;
+  }
   if (atomic_load(&r->blocked) != 0) {
     return run_fail(r, "it did not come back from a call in time: its force was taken off");
   }
   hapi_pulse_beat(&r->pulse, HAPI_PHASE_WRITE, 0);
-  if (hapi_emergencies() == r->emergencies &&
-      !hapi_device_did(r->device->ops->write(r->device->self, &wanted, &reached))) {
+  if (hapi_emergencies() == r->emergencies && !hapi_device_did(hapi_device_write(r->device))) {
     return run_fail(r, "it takes no force");
   }
   return hapi_emergencies() == r->emergencies
@@ -384,7 +379,7 @@ static void run_tell(void *user, uint64_t word)
   const run *r = user;
   (void)word;
   hapi_log(HAP_LOG_ERROR, "device %s does not come back from a call: its force was taken off",
-           r->device->info.name);
+           hapi_device_info(r->device)->name);
 }
 
 static hap_status run_watch(run *r)
@@ -408,7 +403,7 @@ static hap_status run_device(run *r, hap_device_identity *out)
   r->emergencies = hapi_emergencies();
   if (ops->start(r->device->self) < HAP_OK) {
     return hapi_fail(r->detail, HAP_ERROR_DEVICE, "device '%s' did not start",
-                     r->device->info.name);
+                     hapi_device_info(r->device)->name);
   }
   bool known = hapi_emergency_add(ops, r->device->self);
   hap_status status =
@@ -429,7 +424,7 @@ static hap_status run_device(run *r, hap_device_identity *out)
   ops->stop(r->device->self);
   HAPI_TRY(status);
   hap_device_identity_init(out, sizeof *out);
-  memcpy(out->device, r->device->info.name, sizeof out->device);
+  memcpy(out->device, hapi_device_info(r->device)->name, sizeof out->device);
   for (int axis = 0; axis < AXES; ++axis) {
     HAPI_TRY(add_axis(r, axis, out));
   }
@@ -466,8 +461,9 @@ hap_status hap_device_identify(hap_device *device, const hap_identify_def *def,
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "hap_device_identify: device or out is NULL");
   }
   HAPI_TRY(hapi_def_read(&def_type, def, &known, detail));
-  double limit =
-      device->info.max_force > 0.0 ? FORCE_SHARE * device->info.max_force : FORCE_UNKNOWN;
+  double limit = hapi_device_info(device)->max_force > 0.0
+                     ? FORCE_SHARE * hapi_device_info(device)->max_force
+                     : FORCE_UNKNOWN;
   HAPI_TRY(def_check(&known, limit, detail));
   if (!hapi_device_claim(device)) {
     return hapi_fail(detail, HAP_ERROR_STATE, "a pointer has the device");

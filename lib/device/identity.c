@@ -225,19 +225,20 @@ hap_status hap_device_set_identity(hap_device *device, const hap_device_identity
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "hap_device_set_identity: device is NULL");
   }
   HAPI_TRY(identity_read(identity, &known, detail));
-  if (strcmp(known.device, device->info.name) != 0) {
+  if (strcmp(known.device, hapi_device_info(device)->name) != 0) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "the identity is that of '%s', the device is '%s'",
-                     known.device, device->info.name);
+                     known.device, hapi_device_info(device)->name);
   }
   if (!hapi_device_claim(device)) {
     return hapi_fail(detail, HAP_ERROR_STATE, "a pointer has the device: set its identity before");
   }
-  device->info.mass = known.mass;
-  device->info.damping = known.damping;
-  device->info.friction = known.friction;
-  device->info.delay = known.delay;
+  hap_device_info *info = &device->effectors[0].info;
+  info->mass = known.mass;
+  info->damping = known.damping;
+  info->friction = known.friction;
+  info->delay = known.delay;
   if (known.quantum > 0.0) {
-    device->info.quantum = known.quantum;
+    info->quantum = known.quantum;
   }
   hapi_device_release(device);
   return HAP_OK;

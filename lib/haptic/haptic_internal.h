@@ -14,6 +14,7 @@
 #include "base/histogram.h"
 #include "base/pulse.h"
 #include "base/thread.h"
+#include "device/device.h"
 #include "device/watchdog.h"
 #include "haptic/haptic.h"
 #include "record/tape.h"
@@ -58,7 +59,8 @@ typedef struct hapi_pointer_slot {
   hapi_tool_hull hull;
   const hap_device_ops *ops; /* NULL: moved by hap_pointer_set_target */
   void *self;
-  bool has_device; /* also in a replay, where there are no ops */
+  hapi_effector *effector; /* NULL: likewise */
+  bool has_device;         /* also in a replay, where there are no ops */
   bool started;
   hapi_watchdog watchdog;
   hap_device_info info;

@@ -169,7 +169,11 @@ static void ask_device(hapi_haptic *haptic, uint32_t index, int64_t now_ns, hapi
   hapi_pointer_slot *slot = &haptic->slots[index];
   if (slot->ops != NULL) {
     hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_READ, index);
-    hap_status status = slot->ops->read(slot->self, now_ns, &io->pose, &io->twist, &io->buttons);
+    hap_status status = hapi_device_read(slot->def.device, now_ns);
+    const hap_device_input *in = &slot->effector->input;
+    io->pose = in->pose;
+    io->twist = in->twist;
+    io->buttons = in->buttons;
     io->failed = !hapi_device_did(status);
     io->doubted = status == HAP_STALE;
     return;
@@ -225,7 +229,9 @@ void hapi_pointers_write(hapi_haptic *haptic)
     hapi_pointer_output out = {.reached = p->device.wrench};
     if (slot->ops != NULL) {
       hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_WRITE, i);
-      out.failed = !hapi_device_did(slot->ops->write(slot->self, &p->device.wrench, &out.reached));
+      slot->effector->wanted.wrench = p->device.wrench;
+      out.failed = !hapi_device_did(hapi_device_write(slot->def.device));
+      out.reached = slot->effector->reached.wrench;
     }
     if (haptic->tape != NULL) {
       hapi_tape_output(haptic, i, &out);
@@ -408,6 +414,7 @@ static void fill_slot(hapi_pointer_slot *slot, const hapi_pointer_setup *def)
   }
   slot->ops = def->device != NULL ? hapi_device_ops(def->device) : NULL;
   slot->self = def->device != NULL ? hapi_device_self(def->device) : NULL;
+  slot->effector = def->device != NULL ? &def->device->effectors[0] : NULL;
   slot->has_device = def->device != NULL;
   memset(&slot->info, 0, sizeof slot->info);
   if (def->device != NULL) {

@@ -104,8 +104,9 @@ static void replay_close(void *self)
   hapi_free(device);
 }
 
-static hap_status replay_open(const char *args, void **self, hap_detail *detail)
+static hap_status replay_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   replay_device *device = hapi_alloc(sizeof *device);
   if (device == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "replay: out of memory");
@@ -119,8 +120,9 @@ static hap_status replay_open(const char *args, void **self, hap_detail *detail)
   return HAP_OK;
 }
 
-static void replay_describe(void *self, hap_device_info *out)
+static void replay_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   const replay_device *device = self;
   out->dof = device->recording.channels == 7 ? 6 : 3;
   out->measures_velocity = 1; /* the slope of the spline */
@@ -190,9 +192,9 @@ static void pose_place(const replay_device *device, const double *value, const d
   hapi_quat_rotate(device->rotate, twist->angular, twist->angular);
 }
 
-static hap_status replay_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                              uint32_t *buttons)
+static hap_status replay_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   replay_device *device = self;
   hap_status status = hapi_timeline_advance(&device->timeline, time_ns);
   if (status < 0) {
@@ -202,18 +204,19 @@ static hap_status replay_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   double slope[HAPI_RECORDING_CHANNELS_MAX];
   channels_sample(device, device->start + hapi_timeline_seconds(device->timeline.elapsed_ns), value,
                   slope);
-  pose_place(device, value, slope, pose, twist);
-  *buttons = 0;
+  pose_place(device, value, slope, &in->pose, &in->twist);
+  in->buttons = 0;
   return HAP_OK;
 }
 
-static hap_status replay_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status replay_write(void *self, const hap_device_output *const wanted[],
+                               hap_device_output *const reached[])
 {
   replay_device *device = self;
   if (!device->timeline.running) {
     return HAP_ERROR_STATE;
   }
-  return hapi_output_write(&device->output, wanted, reached);
+  return hapi_output_write(&device->output, &wanted[0]->wrench, &reached[0]->wrench);
 }
 
 static void replay_zero(void *self)
@@ -229,10 +232,10 @@ static void replay_stop(void *self)
   hapi_timeline_stop(&device->timeline);
 }
 
-static void replay_held(void *self, hap_wrench *out)
+static void replay_held(void *self, hap_device_output *const out[])
 {
   const replay_device *device = self;
-  hapi_output_get(&device->output, out);
+  hapi_output_get(&device->output, &out[0]->wrench);
 }
 
 const hap_device_ops hapi_replay_ops = {

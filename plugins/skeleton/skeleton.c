@@ -52,8 +52,9 @@ static hap_status read_arguments(skeleton *device, const char *args, hap_detail 
   return HAP_OK;
 }
 
-static hap_status skeleton_open(const char *args, void **self, hap_detail *detail)
+static hap_status skeleton_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context; /* of an application that makes a device of its own: not of a module */
   skeleton *device = calloc(1, sizeof *device);
   if (device == NULL) {
     snprintf(detail->text, sizeof detail->text, "skeleton: out of memory");
@@ -82,9 +83,10 @@ static void skeleton_close(void *self)
 
 /* REPLACE: what you know of your device; leave at 0 what you do not know, and let hapode-run
  * --identify measure mass, damping, friction, delay and quantum. */
-static void skeleton_describe(void *self, hap_device_info *out)
+static void skeleton_describe(void *self, uint32_t effector, hap_device_info *out)
 {
   const skeleton *device = self;
+  (void)effector; /* there is one */
   out->dof = 3;
   out->max_force = device->limit;
   out->quantum = COUNT;
@@ -137,9 +139,9 @@ static void pose_from_counts(skeleton *device, int64_t time_ns, const int32_t co
   device->read_ns = time_ns;
 }
 
-static hap_status skeleton_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                                uint32_t *buttons)
+static hap_status skeleton_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   skeleton *device = self;
   int32_t counts[3];
   if (!device->started) {
@@ -149,11 +151,11 @@ static hap_status skeleton_read(void *self, int64_t time_ns, hap_pose *pose, hap
     return HAP_ERROR_DEVICE;
   }
   pose_from_counts(device, time_ns, counts);
-  *pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  *twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  memcpy(pose->position, device->position, sizeof pose->position);
-  memcpy(twist->linear, device->velocity, sizeof twist->linear);
-  *buttons = 0;
+  in->pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  in->twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  memcpy(in->pose.position, device->position, sizeof in->pose.position);
+  memcpy(in->twist.linear, device->velocity, sizeof in->twist.linear);
+  in->buttons = 0;
   return HAP_OK;
 }
 
@@ -172,10 +174,13 @@ static bool force_shorten(double force[3], double limit)
 
 /* REPLACE: your statics. Rounded towards zero, so that rounding goes beyond no limit; reached is
  * what the rounded currents give. */
-static hap_status skeleton_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status skeleton_write(void *self, const hap_device_output *const wanted[],
+                                 hap_device_output *const reached[])
 {
   const skeleton *device = self;
-  double force[3] = {wanted->force[0], wanted->force[1], wanted->force[2]};
+  const double *asked = wanted[0]->wrench.force;
+  double *given = reached[0]->wrench.force;
+  double force[3] = {asked[0], asked[1], asked[2]};
   int16_t current[3];
   if (!device->started) {
     return HAP_ERROR_STATE;
@@ -185,10 +190,10 @@ static hap_status skeleton_write(void *self, const hap_wrench *wanted, hap_wrenc
     return HAP_ERROR_ARGUMENT;
   }
   bool shortened = force_shorten(force, device->limit);
-  *reached = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  memset(reached[0]->wrench.torque, 0, sizeof reached[0]->wrench.torque);
   for (int axis = 0; axis < 3; ++axis) {
     current[axis] = (int16_t)(force[axis] / NEWTON_MA);
-    reached->force[axis] = NEWTON_MA * current[axis];
+    given[axis] = NEWTON_MA * current[axis];
   }
   if (!hardware_write(device->board, current)) {
     return HAP_ERROR_DEVICE;
@@ -196,14 +201,14 @@ static hap_status skeleton_write(void *self, const hap_wrench *wanted, hap_wrenc
   return shortened ? HAP_SATURATED : HAP_OK;
 }
 
-static void skeleton_held(void *self, hap_wrench *out)
+static void skeleton_held(void *self, hap_device_output *const out[])
 {
   const skeleton *device = self;
   int16_t current[3];
   hardware_currents(device->board, current);
-  memset(out, 0, sizeof *out);
+  memset(&out[0]->wrench, 0, sizeof out[0]->wrench);
   for (int axis = 0; axis < 3; ++axis) {
-    out->force[axis] = NEWTON_MA * current[axis];
+    out[0]->wrench.force[axis] = NEWTON_MA * current[axis];
   }
 }
 

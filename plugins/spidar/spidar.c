@@ -182,9 +182,9 @@ static hap_status boards_ask(hapi_spidar_device *device)
   return sent < 0 ? device_fail(device, HAPI_SPIDAR_HUNG_UP) : HAP_OK;
 }
 
-static hap_status spidar_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                              uint32_t *buttons)
+static hap_status spidar_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   hapi_spidar_device *device = self;
   if (!device->running) {
     return HAP_ERROR_STATE;
@@ -200,8 +200,8 @@ static hap_status spidar_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   }
   hap_status status = take_answer(device, time_ns);
   hap_status asked = needs_restart(device) ? HAP_OK : boards_ask(device);
-  to_frame(device, pose, twist);
-  *buttons = 0;
+  to_frame(device, &in->pose, &in->twist);
+  in->buttons = 0;
   return asked < HAP_OK && status >= HAP_OK ? asked : status;
 }
 
@@ -276,10 +276,11 @@ static void keep_limits(hapi_spidar_device *device)
   (void)hapi_v3_shorten(device->held.torque, device->settings.max_torque);
 }
 
-static hap_status spidar_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status spidar_write(void *self, const hap_device_output *const wanted[],
+                               hap_device_output *const reached[])
 {
   hapi_spidar_device *device = self;
-  hap_wrench local = *wanted;
+  hap_wrench local = wanted[0]->wrench;
   hap_wrench given;
   if (!device->running) {
     return HAP_ERROR_STATE;
@@ -287,7 +288,7 @@ static hap_status spidar_write(void *self, const hap_wrench *wanted, hap_wrench 
   if (needs_restart(device)) {
     return HAP_ERROR_DEVICE;
   }
-  if (!hapi_finite(wanted->force, 3) || !hapi_finite(wanted->torque, 3)) {
+  if (!hapi_finite(wanted[0]->wrench.force, 3) || !hapi_finite(wanted[0]->wrench.torque, 3)) {
     spidar_zero(device);
     return HAP_ERROR_ARGUMENT;
   }
@@ -296,23 +297,23 @@ static hap_status spidar_write(void *self, const hap_wrench *wanted, hap_wrench 
   hapi_quat_unrotate(device->settings.rotate, local.force, local.force);
   hapi_quat_unrotate(device->settings.rotate, local.torque, local.torque);
   bool taut = strings_pull(device, &local, &given);
-  tell_reached(device, wanted, &given);
+  tell_reached(device, &wanted[0]->wrench, &given);
   keep_limits(device);
   lower_zero(device);
   device->asked = true;
   if (send_currents(device) < 0) {
     return device_fail(device, HAPI_SPIDAR_HUNG_UP);
   }
-  *reached = device->held;
+  reached[0]->wrench = device->held;
   return shortened || eased || taut ? HAP_SATURATED : HAP_OK;
 }
 
-static void spidar_held(void *self, hap_wrench *out)
+static void spidar_held(void *self, hap_device_output *const out[])
 {
   const hapi_spidar_device *device = self;
-  memset(out, 0, sizeof *out);
+  memset(&out[0]->wrench, 0, sizeof out[0]->wrench);
   if (!atomic_load(&device->zeroed)) {
-    *out = device->held;
+    out[0]->wrench = device->held;
   }
 }
 
@@ -523,8 +524,9 @@ static void spidar_close(void *self)
   hapi_free(self);
 }
 
-static hap_status spidar_open(const char *args, void **self, hap_detail *detail)
+static hap_status spidar_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   hapi_spidar_device *device = hapi_alloc(sizeof *device);
   if (device == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "spidar: out of memory");
@@ -552,8 +554,9 @@ static double delay_of(const hapi_spidar_device *device)
   return PERIOD_S + BYTE_S * (device->zero_count - HAPI_SPIDAR_ZEROS_BEFORE);
 }
 
-static void spidar_describe(void *self, hap_device_info *out)
+static void spidar_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   const hapi_spidar_device *device = self;
   const hapi_spidar_model *model = &device->model;
   snprintf(out->name, sizeof out->name, "spidar-%s", model->name);

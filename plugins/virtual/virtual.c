@@ -363,8 +363,9 @@ static void virtual_close(void *self)
   hapi_free(device);
 }
 
-static hap_status virtual_open(const char *args, void **self, hap_detail *detail)
+static hap_status virtual_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   virtual_device *device = hapi_alloc(sizeof *device);
   if (device == NULL) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "virtual: out of memory");
@@ -378,8 +379,9 @@ static hap_status virtual_open(const char *args, void **self, hap_detail *detail
   return HAP_OK;
 }
 
-static void virtual_describe(void *self, hap_device_info *out)
+static void virtual_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   const virtual_device *device = self;
   *out = device->info;
 }
@@ -585,9 +587,9 @@ static void show_turn(const virtual_device *device, hap_pose *pose, hap_twist *t
   hapi_m3_apply(matrix, device->wrist.velocity, twist->angular);
 }
 
-static hap_status virtual_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                               uint32_t *buttons)
+static hap_status virtual_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   virtual_device *device = self;
   bool first = !device->timeline.begun;
   uint64_t before_ns = device->timeline.elapsed_ns;
@@ -601,21 +603,22 @@ static hap_status virtual_read(void *self, int64_t time_ns, hap_pose *pose, hap_
     device_move(device, before_ns);
   }
   pose_measure(device, first, device->timeline.elapsed_ns - before_ns);
-  *twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  hapi_v3_copy(device->measured.position, pose->position);
-  hapi_v3_copy(device->measured.velocity, twist->linear);
-  show_turn(device, pose, twist);
-  *buttons = 0;
+  in->twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hapi_v3_copy(device->measured.position, in->pose.position);
+  hapi_v3_copy(device->measured.velocity, in->twist.linear);
+  show_turn(device, &in->pose, &in->twist);
+  in->buttons = 0;
   return HAP_OK;
 }
 
-static hap_status virtual_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status virtual_write(void *self, const hap_device_output *const wanted[],
+                                hap_device_output *const reached[])
 {
   virtual_device *device = self;
   if (!device->timeline.running) {
     return HAP_ERROR_STATE;
   }
-  return hapi_output_write(&device->output, wanted, reached);
+  return hapi_output_write(&device->output, &wanted[0]->wrench, &reached[0]->wrench);
 }
 
 static void virtual_zero(void *self)
@@ -631,10 +634,10 @@ static void virtual_stop(void *self)
   hapi_timeline_stop(&device->timeline);
 }
 
-static void virtual_held(void *self, hap_wrench *out)
+static void virtual_held(void *self, hap_device_output *const out[])
 {
   const virtual_device *device = self;
-  hapi_output_get(&device->output, out);
+  hapi_output_get(&device->output, &out[0]->wrench);
 }
 
 void hapi_virtual_get_port(const void *self, hapi_virtual_port *out)

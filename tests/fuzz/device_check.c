@@ -6,6 +6,7 @@
 
 #include "base/vec.h"
 #include "device/device.h"
+#include "device/one_effector.h"
 #include "tests/fuzz/fuzz.h"
 
 #define ROUNDING (1.0 + 1e-9)
@@ -39,7 +40,8 @@ static void check_write(hap_device *device, double force)
   const hap_device_info *info = hapi_device_info(device);
   const hap_wrench wanted = {{force, -force, 0.5 * force}, {0.0, 0.1 * force, 0.0}};
   hap_wrench reached;
-  hap_status status = hapi_device_ops(device)->write(hapi_device_self(device), &wanted, &reached);
+  hap_status status =
+      hapi_one_write(hapi_device_ops(device), hapi_device_self(device), &wanted, &reached);
   FUZZ_CHECK(status == HAP_OK || status == HAP_SATURATED);
   FUZZ_CHECK(hapi_v3_norm(reached.force) <= info->max_force * ROUNDING);
   FUZZ_CHECK(hapi_v3_norm(reached.torque) <= info->max_torque * ROUNDING);
@@ -59,7 +61,7 @@ static void check_run(hap_device *device)
     uint32_t buttons = 0;
     memset(&pose, 0xff, sizeof pose); /* not a number */
     memset(&twist, 0xff, sizeof twist);
-    FUZZ_CHECK(ops->read(self, times_ns[i], &pose, &twist, &buttons) == HAP_OK);
+    FUZZ_CHECK(hapi_one_read(ops, self, times_ns[i], &pose, &twist, &buttons) == HAP_OK);
     check_read(&pose, &twist);
     check_write(device, forces[i]);
   }

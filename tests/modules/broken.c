@@ -98,8 +98,9 @@ static void wrench_hold(broken *d, const hap_wrench *wrench)
 
 /* ---- operations ---- */
 
-static hap_status broken_open(const char *args, void **self, hap_detail *detail)
+static hap_status broken_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   static const char key[] = "break=";
   broken *d = calloc(1, sizeof *d);
   if (d == NULL) {
@@ -132,8 +133,9 @@ static hap_status broken_open(const char *args, void **self, hap_detail *detail)
   return HAP_OK;
 }
 
-static void broken_describe(void *self, hap_device_info *out)
+static void broken_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   const broken *d = self;
   out->dof = 6;
   out->max_force = fault_is(d, "info_changes") && d->started ? 2.0 * FORCE_MAX : FORCE_MAX;
@@ -216,9 +218,9 @@ static void spoil_read(const broken *d, hap_pose *pose, hap_twist *twist)
   }
 }
 
-static hap_status broken_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                              uint32_t *buttons)
+static hap_status broken_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   broken *d = self;
   hap_pose here;
   if (fault_is(d, "zero_locks")) {
@@ -237,15 +239,15 @@ static hap_status broken_read(void *self, int64_t time_ns, hap_pose *pose, hap_t
   d->first_ns = d->first_ns == 0 ? time_ns : d->first_ns;
   ++d->reads;
   d->reads_pushed += d->pushed;
-  hand_move(d, 1e-9 * (double)(time_ns - d->first_ns), &here, twist);
-  spoil_read(d, &here, twist);
+  hand_move(d, 1e-9 * (double)(time_ns - d->first_ns), &here, &in->twist);
+  spoil_read(d, &here, &in->twist);
   if (fault_is(d, "pose_is_not_filled_in")) {
-    memcpy(pose->position, here.position, sizeof here.position);
+    memcpy(in->pose.position, here.position, sizeof here.position);
   } else {
-    *pose = here;
+    in->pose = here;
   }
   if (!fault_is(d, "buttons_are_not_filled_in")) {
-    *buttons = 0;
+    in->buttons = 0;
   }
   return status;
 }
@@ -302,14 +304,15 @@ static hap_status check_write(broken *d, const hap_wrench *wanted)
   return finite || fault_is(d, "nan_is_taken") ? HAP_OK : HAP_ERROR_ARGUMENT;
 }
 
-static hap_status broken_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status broken_write(void *self, const hap_device_output *const wanted[],
+                               hap_device_output *const reached[])
 {
   broken *d = self;
-  hap_status status = check_write(d, wanted);
+  hap_status status = check_write(d, &wanted[0]->wrench);
   if (status < HAP_OK) {
     return status;
   }
-  hap_wrench given = *wanted;
+  hap_wrench given = wanted[0]->wrench;
   double factor = fault_is(d, "gives_double") ? 2.0 : fault_is(d, "gives_against") ? -1.0 : 1.0;
   for (int i = 0; i < 3; ++i) {
     given.force[i] *= factor;
@@ -319,7 +322,7 @@ static hap_status broken_write(void *self, const hap_wrench *wanted, hap_wrench 
   saturated = vector_shorten(d, given.torque, TORQUE_MAX) || saturated;
   d->pushed = d->pushed || vector_norm(given.force) > 0.0;
   if (!fault_is(d, "reached_is_not_filled_in")) {
-    *reached = given;
+    reached[0]->wrench = given;
   }
   if (fault_is(d, "reached_is_a_lie")) {
     for (int i = 0; i < 3; ++i) {
@@ -382,14 +385,14 @@ static void broken_close(void *self)
   free(d);
 }
 
-static void broken_held(void *self, hap_wrench *out)
+static void broken_held(void *self, hap_device_output *const out[])
 {
   const broken *d = self;
-  memset(out, 0, sizeof *out);
+  memset(&out[0]->wrench, 0, sizeof out[0]->wrench);
   if (fault_is(d, "shared")) {
-    *out = shared;
+    out[0]->wrench = shared;
   } else if (!atomic_load(&d->zeroed)) {
-    *out = d->held;
+    out[0]->wrench = d->held;
   }
 }
 

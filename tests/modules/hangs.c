@@ -50,8 +50,9 @@ static void hang_in(hangs *d, const char *call)
   }
 }
 
-static hap_status hangs_open(const char *args, void **self, hap_detail *detail)
+static hap_status hangs_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   hangs *d = calloc(1, sizeof *d);
   char path[256] = "";
   if (d == NULL || sscanf(args, "call=%15[a-z],file=%255s", d->call, path) < 1) {
@@ -64,8 +65,9 @@ static hap_status hangs_open(const char *args, void **self, hap_detail *detail)
   return HAP_OK;
 }
 
-static void hangs_describe(void *self, hap_device_info *out)
+static void hangs_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   (void)self;
   out->dof = 3;
   out->max_force = 5.0;
@@ -77,29 +79,31 @@ static hap_status hangs_start(void *self)
   return HAP_OK;
 }
 
-static hap_status hangs_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                             uint32_t *buttons)
+static hap_status hangs_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   hangs *d = self;
   hang_in(d, "read");
   d->start_ns = d->start_ns != 0 ? d->start_ns : time_ns;
   double x = fmin(SPEED * 1e-9 * (double)(time_ns - d->start_ns), REACH);
-  *pose = (hap_pose){{x, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  memset(twist, 0, sizeof *twist);
-  *buttons = 0;
+  in->pose = (hap_pose){{x, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  memset(&in->twist, 0, sizeof in->twist);
+  in->buttons = 0;
   return HAP_OK;
 }
 
-static hap_status hangs_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status hangs_write(void *self, const hap_device_output *const wanted[],
+                              hap_device_output *const reached[])
 {
   hangs *d = self;
   hang_in(d, "write");
-  bool force = wanted->force[0] != 0.0 || wanted->force[1] != 0.0 || wanted->force[2] != 0.0;
+  bool force = wanted[0]->wrench.force[0] != 0.0 || wanted[0]->wrench.force[1] != 0.0 ||
+               wanted[0]->wrench.force[2] != 0.0;
   if (force && !atomic_load(&d->holds)) {
     letter_write(d, 'f');
   }
   atomic_store(&d->holds, force);
-  *reached = *wanted;
+  reached[0]->wrench = wanted[0]->wrench;
   return HAP_OK;
 }
 

@@ -27,8 +27,9 @@ static bool variant_is(const char *name)
   return wrong != NULL && strcmp(wrong, name) == 0;
 }
 
-static hap_status tables_open(const char *args, void **self, hap_detail *detail)
+static hap_status tables_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   if (variant_is("open_fails") || strcmp(args, "fail") == 0) {
     snprintf(detail->text, sizeof detail->text, "no board on port 7: is it switched on?");
     return HAP_ERROR_DEVICE;
@@ -43,8 +44,9 @@ static hap_status tables_open(const char *args, void **self, hap_detail *detail)
   return HAP_OK;
 }
 
-static void tables_describe(void *self, hap_device_info *out)
+static void tables_describe(void *self, uint32_t effector, hap_device_info *out)
 {
+  (void)effector;
   (void)self;
   out->dof = variant_is("dof_4") ? 4 : 3;
   out->max_force = variant_is("limit_is_negative") ? -1.0 : 5.0;
@@ -57,21 +59,22 @@ static hap_status tables_start(void *self)
   return HAP_OK;
 }
 
-static hap_status tables_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                              uint32_t *buttons)
+static hap_status tables_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
+  hap_device_input *in = out[0];
   (void)self;
   (void)time_ns;
-  *pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
-  memset(twist, 0, sizeof *twist);
-  *buttons = 0;
+  in->pose = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  memset(&in->twist, 0, sizeof in->twist);
+  in->buttons = 0;
   return HAP_OK;
 }
 
-static hap_status tables_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status tables_write(void *self, const hap_device_output *const wanted[],
+                               hap_device_output *const reached[])
 {
   (void)self;
-  *reached = *wanted;
+  reached[0]->wrench = wanted[0]->wrench;
   return HAP_OK;
 }
 

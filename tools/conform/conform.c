@@ -24,6 +24,7 @@ static const struct {
     {"pose_is_finite_and_unit", conform_pose},
     {"twist_is_finite", conform_twist},
     {"buttons_are_filled_in", conform_buttons},
+    {"axes_are_within_their_ranges", conform_axis_values},
     {"pose_does_not_jump", conform_steps},
     {"reached_is_plausible", conform_reached},
     {"held_is_what_was_reached", conform_held_is_reached},

@@ -12,6 +12,7 @@
 
 #define SHARE 0.05       /* of the device's own limits that the small force may be */
 #define GRAIN 1e-6       /* N, N m: below it is no force */
+#define AXIS_SHARE 0.05  /* of its range, that an axis may be beyond it */
 #define TRAVEL_MOST 0.05 /* m, under the small force, from where it began */
 
 bool conform_is_virtual(const conform *c)
@@ -111,34 +112,52 @@ void conform_zero(conform *c)
   conform_leave();
 }
 
-static void read_judge(conform *c, hap_status status, const conform_sample *s, bool buttons)
+static void input_judge(conform *c, const hapi_effector *effector, uint32_t poison)
 {
-  const double *q = s->pose.quat_wxyz;
+  const hap_device_input *in = &effector->input;
+  const double *q = in->pose.quat_wxyz;
   double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  c->seen.wrong.poses += !(hapi_finite(in->pose.position, 3) && fabs(square - 1.0) < 1e-6);
+  c->seen.wrong.twists += !(hapi_finite(in->twist.linear, 3) && hapi_finite(in->twist.angular, 3));
+  c->seen.wrong.buttons += in->buttons == poison;
+  for (uint32_t i = 0; i < effector->info.axis_count; ++i) {
+    const hap_axis_info *axis = &effector->axes[i];
+    double beyond = AXIS_SHARE * (axis->high - axis->low);
+    c->seen.wrong.axes +=
+        !(in->axes[i] >= axis->low - beyond && in->axes[i] <= axis->high + beyond &&
+          hapi_finite(in->axis_rates + i, 1));
+  }
+}
+
+static void read_judge(conform *c, hap_status status, uint32_t poison)
+{
   ++c->seen.read_count;
   c->seen.wrong.statuses += status < HAP_OK || !conform_status_is_known(status);
-  if (status < HAP_OK) {
-    return;
+  for (uint32_t i = 0; status >= HAP_OK && i < c->device->effector_count; ++i) {
+    input_judge(c, &c->device->effectors[i], poison);
   }
-  c->seen.wrong.poses += !(hapi_finite(s->pose.position, 3) && fabs(square - 1.0) < 1e-6);
-  c->seen.wrong.twists += !(hapi_finite(s->twist.linear, 3) && hapi_finite(s->twist.angular, 3));
-  c->seen.wrong.buttons += !buttons;
 }
 
 hap_status conform_read(conform *c, conform_sample *out)
 {
   uint32_t poison = c->seen.read_count % 2 == 0 ? 0x5a5a5a5au : 0xa5a5a5a5u;
-  uint32_t buttons = poison;
-  memset(out, 0xff, sizeof *out); /* not a number: what is not filled in shows */
+  for (uint32_t i = 0; i < c->device->effector_count; ++i) {
+    hap_device_input *in = &c->device->effectors[i].input;
+    memset(in, 0xff, sizeof *in); /* NaN: what is not filled in shows */
+    in->size = sizeof *in;
+    in->buttons = poison;
+  }
   conform_enter("read", CONFORM_TICK_LIMIT_S);
   int64_t begin_ns = hapi_clock_now();
-  hap_status status = c->ops->read(c->self, c->now_ns, &out->pose, &out->twist, &buttons);
+  hap_status status = hapi_device_read(c->device, c->now_ns);
   int64_t end_ns = hapi_clock_now();
   conform_leave();
   if (c->running) {
     hapi_histogram_add(&c->seen.reads, end_ns - begin_ns);
-    read_judge(c, status, out, buttons != poison);
+    read_judge(c, status, poison);
   }
+  out->pose = c->device->effectors[0].input.pose;
+  out->twist = c->device->effectors[0].input.twist;
   if (c->ops->pacing == HAP_PACING_DEVICE) {
     c->now_ns = end_ns; /* the read has waited */
   }
@@ -146,16 +165,28 @@ hap_status conform_read(conform *c, conform_sample *out)
   return status;
 }
 
+/* Where the device fills in what it gives. */
+static void outputs_poison(const conform *c)
+{
+  for (uint32_t i = 0; i < c->device->effector_count; ++i) {
+    hap_device_output *out = &c->device->effectors[i].reached;
+    memset(out, 0xff, sizeof *out);
+    out->size = sizeof *out;
+  }
+}
+
 hap_status conform_write(conform *c, const hap_wrench *wanted, hap_wrench *reached)
 {
-  memset(reached, 0xff, sizeof *reached);
+  outputs_poison(c);
+  c->device->effectors[0].wanted.wrench = *wanted;
   conform_enter("write", CONFORM_TICK_LIMIT_S);
   int64_t begin_ns = hapi_clock_now();
-  hap_status status = c->ops->write(c->self, wanted, reached);
+  hap_status status = hapi_device_write(c->device);
   if (c->running) {
     hapi_histogram_add(&c->seen.writes, hapi_clock_now() - begin_ns);
   }
   conform_leave();
+  *reached = c->device->effectors[0].reached.wrench;
   return status;
 }
 
@@ -226,14 +257,29 @@ void conform_pause(conform *c, double seconds)
 
 bool conform_held(const conform *c, hap_wrench *out)
 {
-  if (c->ops->size < offsetof(hap_device_ops, held) + sizeof c->ops->held || c->ops->held == NULL) {
+  if (!HAP_HAS_MEMBER(c->ops, held) || c->ops->held == NULL) {
     return false;
   }
-  memset(out, 0xff, sizeof *out);
+  outputs_poison(c);
   conform_enter("held", CONFORM_TICK_LIMIT_S);
-  c->ops->held(c->self, out);
+  c->ops->held(c->self, c->device->reached);
   conform_leave();
+  *out = c->device->effectors[0].reached.wrench;
   return true;
+}
+
+/* After conform_held; NaN where one is. */
+static double axis_force_most(const conform *c)
+{
+  double most = 0.0;
+  for (uint32_t i = 0; i < c->device->effector_count; ++i) {
+    const hapi_effector *effector = &c->device->effectors[i];
+    for (uint32_t k = 0; k < effector->info.axis_count; ++k) {
+      double force = fabs(effector->reached.axis_forces[k]);
+      most = force <= most ? most : force; /* also NaN */
+    }
+  }
+  return most;
 }
 
 bool conform_is_zero(const hap_wrench *wrench)
@@ -248,9 +294,19 @@ bool conform_is_zero(const hap_wrench *wrench)
 void conform_expect_none(conform *c, const char *when)
 {
   hap_wrench held;
-  if (conform_held(c, &held) && !conform_is_zero(&held)) {
-    conform_fail(c, "%s it holds %.3g N and %.3g N m", when, hapi_v3_norm(held.force),
-                 hapi_v3_norm(held.torque));
+  if (!conform_held(c, &held)) {
+    return;
+  }
+  for (uint32_t i = 0; i < c->device->effector_count; ++i) {
+    held = c->device->effectors[i].reached.wrench;
+    if (!conform_is_zero(&held)) {
+      conform_fail(c, "%s it holds %.3g N and %.3g N m", when, hapi_v3_norm(held.force),
+                   hapi_v3_norm(held.torque));
+    }
+  }
+  double axis = axis_force_most(c);
+  if (!(axis <= GRAIN)) {
+    conform_fail(c, "%s it holds %.3g N on an axis", when, axis);
   }
 }
 

@@ -18,6 +18,7 @@
 #include <hapode/device_impl.h>
 
 #include "base/histogram.h"
+#include "device/device.h"
 #include "tools/conform/conform.h"
 
 typedef struct conform_sample {
@@ -36,6 +37,7 @@ typedef struct conform_wrong {
   unsigned poses;
   unsigned twists;
   unsigned buttons;
+  unsigned axes;
   unsigned zero_writes; /* of a zero wrench, between the reads */
 } conform_wrong;
 
@@ -166,6 +168,7 @@ void conform_read_status(conform *c);
 void conform_pose(conform *c);
 void conform_twist(conform *c);
 void conform_buttons(conform *c);
+void conform_axis_values(conform *c);
 void conform_read_time(conform *c);
 void conform_steps(conform *c);
 void conform_twist_fits(conform *c);

@@ -92,15 +92,17 @@ void conform_start_again(conform *c)
 
 /* ---- info ---- */
 
-static void compare_info(conform *c, const char *when)
+static bool is_same_info(conform *c, uint32_t effector)
 {
-  hap_device_info now;
-  memset(&now, 0, sizeof now);
+  hap_device_info now = {.size = sizeof now};
   conform_enter("describe", CONFORM_TICK_LIMIT_S);
-  c->ops->describe(c->self, &now);
+  c->ops->describe(c->self, effector, &now);
   conform_leave();
-  const hap_device_info *then = &c->info;
+  const hap_device_info *then = &c->device->effectors[effector].info;
   bool same = now.dof == then->dof && now.measures_velocity == then->measures_velocity &&
+              (now.effector_count > 0 ? now.effector_count : 1) == then->effector_count &&
+              now.axis_count == then->axis_count && now.button_count == then->button_count &&
+              now.led_count == then->led_count && now.vibrator_count == then->vibrator_count &&
               (now.name[0] == '\0' || strncmp(now.name, then->name, sizeof now.name) == 0);
   const double pairs[][2] = {{now.max_force, then->max_force},
                              {now.max_torque, then->max_torque},
@@ -109,9 +111,24 @@ static void compare_info(conform *c, const char *when)
                              {now.quantum, then->quantum},
                              {now.mass, then->mass},
                              {now.friction, then->friction},
-                             {now.delay, then->delay}};
+                             {now.delay, then->delay},
+                             {now.vibrator_hz[0], then->vibrator_hz[0]},
+                             {now.vibrator_hz[1], then->vibrator_hz[1]}};
   for (size_t i = 0; i < sizeof pairs / sizeof pairs[0]; ++i) {
     same = same && pairs[i][0] == pairs[i][1];
+  }
+  for (int i = 0; i < 3; ++i) {
+    same = same && now.workspace_low[i] == then->workspace_low[i] &&
+           now.workspace_high[i] == then->workspace_high[i];
+  }
+  return same;
+}
+
+static void compare_info(conform *c, const char *when)
+{
+  bool same = true;
+  for (uint32_t i = 0; i < c->device->effector_count; ++i) {
+    same = is_same_info(c, i) && same;
   }
   if (!same) {
     conform_fail(c, "%s it describes itself in another way than when it was opened", when);

@@ -69,6 +69,22 @@ void conform_buttons(conform *c)
   }
 }
 
+void conform_axis_values(conform *c)
+{
+  uint32_t axes = 0;
+  for (uint32_t i = 0; i < c->device->effector_count; ++i) {
+    axes += c->device->effectors[i].info.axis_count;
+  }
+  if (axes == 0) {
+    conform_skip(c, "it has no axes");
+  } else if (conform_needs_reads(c) && c->seen.wrong.axes > 0) {
+    conform_fail(c,
+                 "in %u reads an axis or its rate was not filled in, not finite, or beyond its "
+                 "low and high %u times",
+                 c->seen.read_count, c->seen.wrong.axes);
+  }
+}
+
 static bool needs_record(conform *c)
 {
   bool good = conform_needs_reads(c);

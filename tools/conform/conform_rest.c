@@ -51,7 +51,7 @@ void conform_arguments(conform *c)
     return;
   }
   conform_enter("open", CONFORM_BLOCK_LIMIT_S);
-  hap_status status = c->ops->open(args, &self, &detail);
+  hap_status status = c->ops->open(NULL, args, &self, &detail);
   if (status >= HAP_OK && self != NULL) {
     c->ops->close(self);
   }

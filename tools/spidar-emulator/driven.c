@@ -57,8 +57,9 @@ static void port_flush(void *self)
 
 /* ---- the device ---- */
 
-static hap_status driven_open(const char *args, void **self, hap_detail *detail)
+static hap_status driven_open(void *context, const char *args, void **self, hap_detail *detail)
 {
+  (void)context;
   const hapi_spidar_model *model = hapi_spidar_model_find("x4r");
   const emulator_def def = {.model = model,
                             .board_count = 2,
@@ -90,10 +91,10 @@ static hap_status driven_open(const char *args, void **self, hap_detail *detail)
   return HAP_OK;
 }
 
-static void driven_describe(void *self, hap_device_info *out)
+static void driven_describe(void *self, uint32_t effector, hap_device_info *out)
 {
   driven_spidar *d = self;
-  hapi_spidar_ops.describe(&d->device, out);
+  hapi_spidar_ops.describe(&d->device, effector, out);
 }
 
 static hap_status driven_start(void *self)
@@ -106,21 +107,21 @@ static hap_status driven_start(void *self)
   return hapi_spidar_begin(&d->device, &port) == HAPI_SPIDAR_WELL ? HAP_OK : HAP_ERROR_DEVICE;
 }
 
-static hap_status driven_read(void *self, int64_t time_ns, hap_pose *pose, hap_twist *twist,
-                              uint32_t *buttons)
+static hap_status driven_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
   driven_spidar *d = self;
   double time = 1e-9 * (double)time_ns;
   d->begun = d->begun < 0.0 ? d->now - time : d->begun;
   d->now = d->begun + time;
-  hap_status status = hapi_spidar_ops.read(&d->device, time_ns, pose, twist, buttons);
+  hap_status status = hapi_spidar_ops.read(&d->device, time_ns, out);
   if (d->spoil != NULL) { /* of what the boards answer to the command that follows */
     d->spoil(d, time, d->user);
   }
   return status;
 }
 
-static hap_status driven_write(void *self, const hap_wrench *wanted, hap_wrench *reached)
+static hap_status driven_write(void *self, const hap_device_output *const wanted[],
+                               hap_device_output *const reached[])
 {
   driven_spidar *d = self;
   return hapi_spidar_ops.write(&d->device, wanted, reached);
@@ -155,7 +156,7 @@ static void driven_close(void *self)
   hapi_free(d);
 }
 
-static void driven_held(void *self, hap_wrench *out)
+static void driven_held(void *self, hap_device_output *const out[])
 {
   driven_spidar *d = self;
   hapi_spidar_ops.held(&d->device, out);
