@@ -194,6 +194,76 @@ TEST(while_the_motion_scale_changes_the_pointer_stands_and_nothing_leaps)
   CHECK_NEAR(hand_state(d).twist.linear[0], 0.3, 1e-9);
 }
 
+/* ---- shape, what it touches, coupling ---- */
+
+static const double wedge[4][3] = {
+    {0.03, 0.03, -0.012}, {0.03, -0.03, -0.012}, {-0.03, 0.0, -0.012}, {0.0, 0.0, 0.03}};
+
+/* Goes from the force at the begin to none and on to another one, and never by much more a tick
+ * than a ramp of 20 ms: two of them may come together. */
+static void hand_swaps(desk *d, const hap_pointer_settings *s, double newtons)
+{
+  const hap_pointer_id id = d->hand;
+  double most = 3.0 * fmax(hand_state(d).wrench.force[2], newtons) * T / SET_S;
+  hand_set(d, s);
+  CHECK(force_steepest(d, 30) <= most);
+  CHECK(force_steepest(d, 150) <= most);
+  CHECK_NEAR(hand_state(d).wrench.force[2], newtons, 1e-6);
+  CHECK(hand_state(d).guard == 0);
+  CHECK(d->hand.v == id.v);
+  CHECK(session_stats(d->session).faults.fault == HAP_FAULT_NONE);
+}
+
+static const model_row swapped[] = {
+    {"a_shape_is_another_one_while_the_pointer_runs_in_model_impulse", HAP_MODEL_IMPULSE},
+    {"a_shape_is_another_one_while_the_pointer_runs_in_model_contact", HAP_MODEL_CONTACT},
+};
+
+TEST_EACH(swapped, const model_row *row)
+{
+  desk *d = floor_desk(row->model);
+  hap_pointer_settings s = settings_of(HAP_SET_SHAPE);
+  s.radius = RADIUS + 0.001;
+  hand_swaps(d, &s, STIFFNESS * (DEPTH + 0.001));
+  s.hull_xyz = &wedge[0][0];
+  s.hull_points = 4;
+  s.radius = 0.0;
+  hand_swaps(d, &s, STIFFNESS * (0.012 - RADIUS + DEPTH));
+  s = settings_of(HAP_SET_SHAPE);
+  hand_swaps(d, &s, STIFFNESS * DEPTH); /* the sphere of the default */
+  CHECK_NEAR(s.radius, RADIUS, 0.0);
+}
+
+TEST(collide_bits_that_are_set_are_felt)
+{
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  dGeomSetCategoryBits(dSpaceGetGeom(d->space, 0), 2u);
+  hap_pointer_settings s = settings_of(HAP_SET_COLLIDE_BITS);
+  s.collide_bits = 1u;
+  hand_swaps(d, &s, 0.0);
+  s.collide_bits = 3u;
+  hand_swaps(d, &s, STIFFNESS * DEPTH);
+}
+
+TEST(a_coupling_is_another_one_while_the_pointer_runs)
+{
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  hap_pointer_settings s = settings_of(HAP_SET_COUPLING);
+  s.coupling = HAP_COUPLING_PROXY;
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT); /* no stiffness */
+  s.coupling_stiffness = STIFFNESS;
+  hand_swaps(d, &s, 0.5 * STIFFNESS * DEPTH); /* two springs in series */
+  CHECK(hand_state(d).coupling == HAP_COUPLING_PROXY);
+  s.coupling = HAP_COUPLING_GOD_OBJECT;
+  hand_swaps(d, &s, STIFFNESS * DEPTH);
+  CHECK(hand_state(d).coupling == HAP_COUPLING_GOD_OBJECT);
+  s.coupling = HAP_COUPLING_DIRECT;
+  hand_swaps(d, &s, STIFFNESS * DEPTH);
+  desk *other = floor_desk(HAP_MODEL_IMPULSE);
+  s.coupling = HAP_COUPLING_PROXY;
+  CHECK(hap_pointer_set(other->session, other->hand, &s) == HAP_ERROR_UNSUPPORTED);
+}
+
 /* ---- the base ---- */
 
 typedef struct coupling_row {
@@ -549,6 +619,12 @@ TEST(wrong_settings_change_nothing_and_say_what_is_wrong)
   CHECK(told.stiffness == STIFFNESS);
   s = settings_of(1u << 20);
   CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
+  s = settings_of(HAP_SET_SHAPE);
+  s.hull_xyz = &wedge[0][0];
+  s.hull_points = 3;
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
+  s.hull_points = 65;
+  CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
   s = settings_of(HAP_SET_TELEPORT);
   CHECK(hap_pointer_set(d->session, d->hand, &s) == HAP_ERROR_ARGUMENT);
   s = settings_of(HAP_SET_BASE);
@@ -590,6 +666,12 @@ static void hand_ride(desk *d)
     s.friction = 0.01 * i;
     s.motion_scale = 1.0 + 0.01 * i;
     s.max_force = 20.0 - 0.2 * i;
+    if (i % 11 == 6) {
+      s.mask |= HAP_SET_SHAPE | HAP_SET_COLLIDE_BITS;
+      s.hull_xyz = i % 2 == 0 ? &wedge[0][0] : NULL;
+      s.hull_points = i % 2 == 0 ? 4 : 0;
+      s.radius = 0.001 + 0.0003 * i;
+    }
     hand_set(d, &s);
     if (i % 8 == 3) {
       REQUIRE(hap_pointer_clutch(d->session, d->hand, i % 16 == 3) == HAP_OK);

@@ -31,7 +31,10 @@ typedef enum hap_pointer_set_bit {
   HAP_SET_UNCLUTCHED = 128,
   /* No field: the pointer leaps to where the base puts it. Without this bit it goes there within
    * 20 ms, or leaps where it is farther away than 0.2 m or 2 rad. */
-  HAP_SET_TELEPORT = 256
+  HAP_SET_TELEPORT = 256,
+  HAP_SET_SHAPE = 512, /* radius, hull_xyz and hull_points */
+  HAP_SET_COLLIDE_BITS = 1024,
+  HAP_SET_COUPLING = 2048 /* coupling, coupling_stiffness and coupling_damping */
 } hap_pointer_set_bit;
 
 /* Fields of hap_pointer_def that can be set later. It has a size and may grow at its end. */
@@ -52,6 +55,13 @@ typedef struct hap_pointer_settings {
   double finger_radius;
   double max_force;
   double max_torque;
+  double radius;
+  const double *hull_xyz; /* copied by hap_pointer_set */
+  size_t hull_points;
+  uint32_t collide_bits;
+  hap_coupling coupling; /* this and the next: as in hap_pointer_expert_def */
+  double coupling_stiffness;
+  double coupling_damping;
 } hap_pointer_settings;
 
 /* [any] Fills *settings with the defaults of hap_pointer_def and an empty mask. size_of_settings:
@@ -67,16 +77,21 @@ HAP_API void hap_pointer_settings_init(hap_pointer_settings *settings, size_t si
  *                           velocity in the world.
  *   motion scale, force scale, stiffness, damping, friction   reached in 20 ms
  *   limits                  a lower one at the slew limit, a higher one in 100 ms
+ *   shape, collide bits, coupling   while something is felt, the force goes within 20 ms, and the
+ *                           next one comes as that of a deep contact. A shape is known to physics
+ *                           from the next step on; until then the pointer touches nothing.
  *
  * HAP_ERROR_ARGUMENT, and nothing changes: an unknown bit, or a field out of the range of
- * hap_pointer_def. HAP_ERROR_NOT_FOUND: no such pointer. HAP_ERROR_UNINITIALISED: settings did not
+ * hap_pointer_def. HAP_ERROR_UNSUPPORTED: a coupling that needs model CONTACT, in a session of
+ * another one. HAP_ERROR_NOT_FOUND: no such pointer. HAP_ERROR_UNINITIALISED: settings did not
  * go through hap_pointer_settings_init. HAP_ERROR_STATE: the session plays a recording, which has
  * what was set. */
 HAP_API hap_status hap_pointer_set(hap_session *session, hap_pointer_id pointer,
                                    const hap_pointer_settings *settings);
 
-/* [any] What was set last, or given to hap_pointer_add; mask has the bits of all fields. *out went
- * through hap_pointer_settings_init. HAP_ERROR_NOT_FOUND: no such pointer. */
+/* [any] What was set last, or given to hap_pointer_add. mask has the bits of all fields, but not
+ * HAP_SET_SHAPE of a hull: its points are not given back, and hull_xyz is NULL. *out went through
+ * hap_pointer_settings_init. HAP_ERROR_NOT_FOUND: no such pointer. */
 HAP_API hap_status hap_pointer_settings_get(const hap_session *session, hap_pointer_id pointer,
                                             hap_pointer_settings *out);
 

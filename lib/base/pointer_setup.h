@@ -41,14 +41,16 @@ typedef struct hapi_pointer_setup {
 
 /* Bits of a setting beside those of the API. */
 enum {
-  HAPI_SET_CLUTCH = 1 << 30
+  HAPI_SET_CLUTCH = 1 << 30,
+  /* Those that come in while no force is felt. */
+  HAPI_SET_SWAP = HAP_SET_SHAPE | HAP_SET_COLLIDE_BITS | HAP_SET_COUPLING
 };
 
 #define HAPI_SET_BITS 32
 
 /* What is set while a pointer runs: the fields of def that the mask names. Recordings hold it. */
 typedef struct hapi_pointer_setting {
-  hapi_pointer_setup def; /* device and hull_xyz NULL, no hull_points */
+  hapi_pointer_setup def; /* device and hull_xyz NULL; hull_points with HAP_SET_SHAPE alone */
   hap_twist twist_world_device;
   int64_t base_time_ns; /* 0: of the tick that takes it */
   uint32_t mask;        /* hap_pointer_set_bit, HAPI_SET_CLUTCH */

@@ -71,9 +71,9 @@ void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                   const hap_twist *twist);
 /* [any] Changes what was set last by merge, which says what is wrong, and hands it to the loop.
- * of: merge's. */
+ * of: merge's; io_hull: of HAP_SET_SHAPE. */
 typedef hap_status (*hapi_setting_merge)(const void *of, hapi_pointer_setting *io,
-                                         hap_detail *detail);
+                                         hapi_tool_hull *io_hull, hap_detail *detail);
 /* The fields that the mask names. */
 void hapi_settings_copy(uint32_t mask, const hapi_pointer_setup *from, hapi_pointer_setup *to);
 hap_status hapi_haptic_set_pointer(hapi_haptic *haptic, hap_pointer_id id, hapi_setting_merge merge,

@@ -17,6 +17,7 @@
 #include "device/device.h"
 #include "device/watchdog.h"
 #include "haptic/haptic.h"
+#include "haptic/settings_box.h"
 #include "record/tape.h"
 #include "sync/triple_buffer.h"
 #include "tick/black_box.h"
@@ -37,20 +38,6 @@ typedef struct hapi_pointer_target {
   hap_pose pose;
   hap_twist twist;
 } hapi_pointer_target;
-
-/* Hand-over of what is set. Several settings between two ticks are one: each bit of the mask has
- * the number of the setting that had it last. */
-typedef struct hapi_pointer_wishes {
-  hapi_pointer_setting value;
-  uint32_t numbers[HAPI_SET_BITS];
-} hapi_pointer_wishes;
-
-typedef struct hapi_pointer_settings_box {
-  hapi_triple_buffer buffer;
-  hapi_pointer_wishes places[3];
-  hapi_pointer_wishes newest;    /* of the application, under the slot's lock */
-  uint32_t taken[HAPI_SET_BITS]; /* of the loop */
-} hapi_pointer_settings_box;
 
 typedef struct hapi_pointer_slot {
   _Atomic int phase;
@@ -247,7 +234,8 @@ void hapi_tape_standstill(hapi_haptic *haptic, hapi_loop_standstill *io);
 void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches);
 void hapi_tape_join(hapi_haptic *haptic, uint32_t index);
 void hapi_tape_leave(hapi_haptic *haptic, uint32_t index, bool pauses);
-void hapi_tape_set(hapi_haptic *haptic, uint32_t index, const hapi_pointer_setting *setting);
+void hapi_tape_set(hapi_haptic *haptic, uint32_t index, const hapi_pointer_setting *setting,
+                   const hapi_tool_hull *hull);
 void hapi_tape_input(hapi_haptic *haptic, uint32_t index, hapi_pointer_input *io);
 void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *io);
 void hapi_tape_ticked(hapi_haptic *haptic);
@@ -256,7 +244,8 @@ bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pa
 bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out,
                          hap_device_info *out_info, hapi_tool_hull *out_hull);
 
-bool hapi_tape_next_set(hapi_haptic *haptic, uint32_t index, hapi_pointer_setting *out);
+bool hapi_tape_next_set(hapi_haptic *haptic, uint32_t index, hapi_pointer_setting *out,
+                        hapi_tool_hull *out_hull);
 
 /* loop_effects.c */
 void hapi_loop_effects_reset(hapi_haptic *haptic);
@@ -280,6 +269,8 @@ void hapi_standstill_stats(const hapi_haptic *haptic, hap_stats *io);      /* [a
 void hapi_settings_prepare(hapi_pointer_slot *slot); /* for a new user of the slot */
 void hapi_pointer_set_coupling(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
                                hapi_pointer *io);
+void hapi_pointer_set_shape(const hapi_haptic *haptic, uint32_t index);
+void hapi_settings_swap(hapi_pointer_slot *slot); /* what waits, into its def */
 hapi_device_limits hapi_pointer_limits(const hapi_pointer_slot *slot);
 /* [haptic] What was set since, and a tick on the way there. */
 void hapi_settings_follow(hapi_haptic *haptic, uint32_t index, int64_t now_ns);

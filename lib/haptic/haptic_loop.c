@@ -5,6 +5,7 @@
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/effect_clock.h"
+#include "base/pointer_id.h"
 #include "base/thread.h"
 #include "base/vec.h"
 #include "device/emergency.h"
@@ -90,7 +91,7 @@ static void figures_publish(hapi_haptic *haptic)
   STORE(faults.count, latch->count);
   STORE(faults.fault, (int)latch->fault);
   STORE(faults.fault_pointer,
-        ((uint64_t)latch->generation << 32) | latch->pointer); /* id; 0: none */
+        hapi_pointer_id_of(latch->generation, latch->pointer)); /* id; 0: none */
   STORE(faults.stale_times, tick->guard.stale_times);
   STORE(faults.stale_ticks, tick->guard.stale_ticks);
   STORE(hand.slewed_ticks, tick->guard.slewed_ticks);

@@ -3,10 +3,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/pointer_id.h"
 #include "base/safety.h"
 #include "base/vec.h"
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
+#include "pointer/coupling.h"
 #include "pointer/frame.h"
 
 /* What is set while a pointer runs. Applications hand it over by a triple buffer; a tick takes it,
@@ -72,6 +74,21 @@ void hapi_pointer_set_coupling(const hapi_haptic *haptic, const hapi_pointer_slo
   set_spin_coupling(slot, io);
 }
 
+void hapi_pointer_set_shape(const hapi_haptic *haptic, uint32_t index)
+{
+  const hapi_pointer_slot *slot = &haptic->slots[index];
+  hapi_pointer_shape *shape = &haptic->tick.pointers.of[index].shape;
+  double farthest = 0.0;
+  haptic->tick.pointers.hulls[index] = slot->hull;
+  for (uint32_t i = 0; i < slot->hull.count; ++i) {
+    farthest = fmax(farthest, hapi_v3_norm(slot->hull.points[i]));
+  }
+  shape->collide_bits = slot->def.collide_bits;
+  shape->radius = slot->def.radius;
+  shape->hull = slot->hull.count > 0 ? &haptic->tick.pointers.hulls[index] : NULL;
+  shape->extent = slot->def.radius + farthest;
+}
+
 hapi_device_limits hapi_pointer_limits(const hapi_pointer_slot *slot)
 {
   const hapi_pointer_setup *def = &slot->def;
@@ -130,6 +147,50 @@ static bool limits_follow(hapi_pointer *p, double seconds)
   return false;
 }
 
+void hapi_settings_swap(hapi_pointer_slot *slot)
+{
+  hapi_settings_copy(slot->set.swaps, &slot->set.next, &slot->def);
+  if ((slot->set.swaps & HAP_SET_SHAPE) != 0) {
+    slot->hull = slot->set.next_hull;
+  }
+  slot->set.swaps = 0;
+}
+
+/* The pointer is another one from this tick on: nothing of its contacts, its proxy and their forces
+ * goes on. */
+static void pointer_swap(hapi_haptic *haptic, uint32_t index)
+{
+  hapi_pointer_slot *slot = &haptic->slots[index];
+  hapi_pointer *p = &haptic->tick.pointers.of[index];
+  bool shape = (slot->set.swaps & (HAP_SET_SHAPE | HAP_SET_COLLIDE_BITS)) != 0;
+  hapi_settings_swap(slot);
+  if (shape) {
+    slot->set.shape = (slot->set.shape + 1u) & (UINT32_MAX >> HAPI_SHAPE_SHIFT);
+    p->generation = slot->generation | slot->set.shape << HAPI_SHAPE_SHIFT;
+    hapi_pointer_set_shape(haptic, index);
+    hapi_pointer_feel(p, hapi_wish(haptic->tick.facts.wishes, HAP_EFFECT_TORQUE), false);
+  }
+  hapi_touches_forget(&haptic->tick.touches, index);
+  memset(&p->wrench, 0, sizeof p->wrench);
+  p->contacts = 0;
+  p->proxied = p->rigid = false;
+  p->proxy.row = 0;
+  p->coupling.near_stiffness = p->coupling.contact_stiffness = 0.0;
+  hapi_pointer_set_coupling(haptic, slot, p);
+  haptic->tick.pointers.proxies = true; /* until the next model says what is wished for */
+}
+
+/* Whether nobody would feel it. */
+static bool pointer_may_swap(const hapi_haptic *haptic, const hapi_pointer *p)
+{
+  const hap_wrench *felt = &p->guard.written;
+  bool guarded = haptic->tick.guard.mode == HAP_GUARD_ON;
+  bool none = hapi_v3_norm(p->wrench.force) == 0.0 && hapi_v3_norm(p->wrench.torque) == 0.0;
+  bool off = hapi_v3_norm(felt->force) == 0.0 && hapi_v3_norm(felt->torque) == 0.0;
+  return !guarded || (off && (none || p->guard.share <= 0.0)) ||
+         haptic->tick.guard.latch.fault != HAP_FAULT_NONE;
+}
+
 static void pointer_glide(const hapi_haptic *haptic, const hapi_pointer_slot *slot, hapi_pointer *p)
 {
   hapi_pointer_glides *g = &p->glides;
@@ -174,11 +235,34 @@ static void setting_apply_frame(hapi_pointer *p, const hapi_pointer_setting *s, 
   }
 }
 
+/* Those of the bits that would be something else than now. */
+static uint32_t swaps_wanted(const hapi_pointer_slot *slot, const hapi_pointer_setting *s,
+                             const hapi_tool_hull *hull)
+{
+  const hapi_pointer_setup *now = &slot->def;
+  const hapi_pointer_setup *def = &s->def;
+  bool shape = def->radius != now->radius || hull->count != slot->hull.count ||
+               memcmp(hull->points, slot->hull.points, hull->count * sizeof hull->points[0]) != 0;
+  bool coupling = def->coupling != now->coupling ||
+                  def->coupling_stiffness != now->coupling_stiffness ||
+                  def->coupling_damping != now->coupling_damping;
+  uint32_t other = slot->set.swaps | (shape ? (uint32_t)HAP_SET_SHAPE : 0) |
+                   (coupling ? (uint32_t)HAP_SET_COUPLING : 0) |
+                   (def->collide_bits != now->collide_bits ? (uint32_t)HAP_SET_COLLIDE_BITS : 0);
+  return s->mask & other & HAPI_SET_SWAP;
+}
+
 static void setting_apply(hapi_pointer_slot *slot, hapi_pointer *p, const hapi_pointer_setting *s,
-                          int64_t now_ns)
+                          const hapi_tool_hull *hull, int64_t now_ns)
 {
   hapi_pointer_glides *g = &p->glides;
-  hapi_settings_copy(s->mask, &s->def, &slot->def);
+  uint32_t swaps = swaps_wanted(slot, s, hull);
+  hapi_settings_copy(s->mask & ~(uint32_t)HAPI_SET_SWAP, &s->def, &slot->def);
+  hapi_settings_copy(swaps, &s->def, &slot->set.next);
+  slot->set.swaps |= swaps;
+  if ((swaps & HAP_SET_SHAPE) != 0) {
+    slot->set.next_hull = *hull;
+  }
   setting_apply_frame(p, s, now_ns);
   if ((s->mask & HAP_SET_FORCE_SCALE) != 0) {
     glide_to(&g->force_scale, s->def.force_scale);
@@ -201,10 +285,12 @@ static void setting_apply(hapi_pointer_slot *slot, hapi_pointer *p, const hapi_p
 }
 
 /* Several settings since the last tick are one. */
-static void settings_take(hapi_pointer_settings_box *box, hapi_pointer_setting *out)
+static void settings_take(hapi_pointer_settings_box *box, hapi_pointer_setting *out,
+                          hapi_tool_hull *out_hull)
 {
   const hapi_pointer_wishes *wishes = &box->places[hapi_triple_front(&box->buffer)];
   *out = wishes->value;
+  *out_hull = wishes->hull;
   out->mask = 0;
   for (int i = 0; i < HAPI_SET_BITS; ++i) {
     out->mask |= wishes->numbers[i] != box->taken[i] ? 1u << i : 0;
@@ -212,23 +298,37 @@ static void settings_take(hapi_pointer_settings_box *box, hapi_pointer_setting *
   memcpy(box->taken, wishes->numbers, sizeof box->taken);
 }
 
-void hapi_settings_follow(hapi_haptic *haptic, uint32_t index, int64_t now_ns)
+static void settings_receive(hapi_haptic *haptic, uint32_t index, int64_t now_ns)
 {
   hapi_pointer_slot *slot = &haptic->slots[index];
   hapi_pointer *p = &haptic->tick.pointers.of[index];
   hapi_pointer_setting setting;
-  if (hapi_tape_plays(haptic->tape)) {
-    while (hapi_tape_next_set(haptic, index, &setting)) {
-      setting_apply(slot, p, &setting, now_ns);
-    }
-  } else if (hapi_triple_take(&slot->set.buffer)) {
-    settings_take(&slot->set, &setting);
-    hapi_tape_set(haptic, index, &setting);
-    setting_apply(slot, p, &setting, now_ns);
+  hapi_tool_hull hull;
+  bool taken = hapi_tape_plays(haptic->tape) ? hapi_tape_next_set(haptic, index, &setting, &hull)
+                                             : hapi_triple_take(&slot->set.buffer);
+  if (!taken) {
+    return;
   }
+  if (!hapi_tape_plays(haptic->tape)) {
+    settings_take(&slot->set, &setting, &hull);
+    hapi_tape_set(haptic, index, &setting, &hull);
+  }
+  setting_apply(slot, p, &setting, &hull, now_ns);
+}
+
+void hapi_settings_follow(hapi_haptic *haptic, uint32_t index, int64_t now_ns)
+{
+  hapi_pointer_slot *slot = &haptic->slots[index];
+  hapi_pointer *p = &haptic->tick.pointers.of[index];
+  settings_receive(haptic, index, now_ns);
+  if (slot->set.swaps != 0 && pointer_may_swap(haptic, p)) {
+    pointer_swap(haptic, index);
+  }
+  p->guard.fades = p->frame.clutched || slot->set.swaps != 0;
   if (p->glides.any) {
     pointer_glide(haptic, slot, p);
   }
+  p->glides.any = p->glides.any || slot->set.swaps != 0;
 }
 
 /* ---- the application's side ---- */
@@ -240,7 +340,6 @@ void hapi_settings_prepare(hapi_pointer_slot *slot)
   hapi_triple_init(&box->buffer);
   box->newest.value.def = slot->def;
   box->newest.value.def.device = NULL;
-  box->newest.value.def.hull_points = 0;
   box->newest.value.def.velocity = HAP_VELOCITY_AUTO; /* of the device, which is not there */
 }
 
@@ -268,5 +367,17 @@ void hapi_settings_copy(uint32_t mask, const hapi_pointer_setup *from, hapi_poin
   if ((mask & HAP_SET_LIMITS) != 0) {
     to->max_force = from->max_force;
     to->max_torque = from->max_torque;
+  }
+  if ((mask & HAP_SET_SHAPE) != 0) {
+    to->radius = from->radius;
+    to->hull_points = from->hull_points;
+  }
+  if ((mask & HAP_SET_COLLIDE_BITS) != 0) {
+    to->collide_bits = from->collide_bits;
+  }
+  if ((mask & HAP_SET_COUPLING) != 0) {
+    to->coupling = from->coupling;
+    to->coupling_stiffness = from->coupling_stiffness;
+    to->coupling_damping = from->coupling_damping;
   }
 }

@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/pointer_id.h"
 #include "base/safety.h"
 #include "base/vec.h"
 #include "device/device.h"
@@ -22,7 +23,7 @@
 
 static void pointer_activate(hapi_haptic *haptic, uint32_t index)
 {
-  const hapi_pointer_slot *slot = &haptic->slots[index];
+  hapi_pointer_slot *slot = &haptic->slots[index];
   const hapi_pointer_setup *def = &slot->def;
   const hap_device_info *info = &slot->info;
   hapi_pointer *p = &haptic->tick.pointers.of[index];
@@ -30,19 +31,9 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   haptic->tick.pointers.high =
       index >= haptic->tick.pointers.high ? index + 1 : haptic->tick.pointers.high;
   p->generation = slot->generation;
-  p->shape.collide_bits = def->collide_bits;
-  p->shape.radius = def->radius;
+  slot->set.shape = 0;
+  hapi_pointer_set_shape(haptic, index);
   p->device.three_dof = slot->has_device && info->dof < 6;
-  p->shape.extent = def->radius;
-  if (slot->hull.count > 0) {
-    double farthest = 0.0;
-    haptic->tick.pointers.hulls[index] = slot->hull;
-    p->shape.hull = &haptic->tick.pointers.hulls[index];
-    for (uint32_t i = 0; i < slot->hull.count; ++i) {
-      farthest = fmax(farthest, hapi_v3_norm(slot->hull.points[i]));
-    }
-    p->shape.extent += farthest;
-  }
   p->surface.stiffness = def->stiffness;
   p->surface.damping = def->damping;
   p->surface.friction = def->friction;
@@ -73,7 +64,8 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
 static void slot_prepare(hapi_pointer_slot *slot)
 {
   pthread_mutex_lock(&slot->lock);
-  atomic_fetch_add(&slot->generation, 1);
+  uint32_t generation = (atomic_load(&slot->generation) + 1u) & HAPI_GENERATION_MASK;
+  atomic_store(&slot->generation, generation != 0 ? generation : 1u);
   hapi_triple_init(&slot->target_buffer);
   hapi_triple_init(&slot->state_buffer);
   memset(slot->targets, 0, sizeof slot->targets);
@@ -110,6 +102,7 @@ static void follow_tape(hapi_haptic *haptic)
     slot->def = joined.def;
     slot->info = info;
     slot->has_device = joined.has_device != 0;
+    slot->set.swaps = 0; /* is in the def */
     if (atomic_load(&slot->phase) != HAPI_POINTER_PAUSED ||
         slot->generation != joined.generation) { /* one that was paused has the id that it had */
       slot_prepare(slot);
@@ -138,6 +131,7 @@ void hapi_pointers_follow(hapi_haptic *haptic)
     /* A pointer that the application moves comes in with its first target. */
     bool ready = slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
     if (phase == HAPI_POINTER_ADDED && ready) {
+      hapi_settings_swap(slot);
       pointer_activate(haptic, i);
       hapi_tape_join(haptic, i);
       /* Fails when the application wants it back meanwhile: seen at the next tick. */
@@ -586,12 +580,14 @@ hap_status hapi_haptic_set_pointer(hapi_haptic *haptic, hap_pointer_id id, hapi_
   }
   hapi_pointer_wishes *newest = &slot->set.newest;
   hapi_pointer_setting value = newest->value;
-  hap_status status = merge(of, &value, detail);
+  hapi_tool_hull hull = newest->hull;
+  hap_status status = merge(of, &value, &hull, detail);
   if (status >= HAP_OK) {
     status = check_coupling(haptic, slot, &value.def, detail);
   }
   if (status >= HAP_OK) {
     newest->value = value;
+    newest->hull = hull;
     for (int i = 0; i < HAPI_SET_BITS; ++i) {
       newest->numbers[i] += value.mask >> i & 1u;
     }

@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "base/pointer_id.h"
 #include "haptic/haptic_internal.h"
 
 /* The loop's part of a recording: all that a tick has from outside is put on the tape, or in a
@@ -101,6 +102,11 @@ void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches)
 }
 
 /* ---- pointers come and go ---- */
+
+static void hull_count(size_t points, hapi_tool_hull *out)
+{
+  out->count = points <= HAPI_TOOL_POINTS_MAX ? (uint32_t)points : 0;
+}
 
 static void hull_move(hapi_tape *tape, uint32_t index, hapi_tool_hull *io)
 {
@@ -211,21 +217,29 @@ bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *
   memset(out_info, 0, sizeof *out_info);
   out_info->size = sizeof *out_info;
   device_move(tape, &out->device, out_info);
-  uint32_t points = (uint32_t)out->def.hull_points;
-  out_hull->count = points <= HAPI_TOOL_POINTS_MAX ? points : 0;
+  hull_count(out->def.hull_points, out_hull);
   hull_move(tape, *out_index, out_hull);
   return !tape->broken && *out_index < haptic->config.capacity.pointers;
 }
 
-void hapi_tape_set(hapi_haptic *haptic, uint32_t index, const hapi_pointer_setting *setting)
+void hapi_tape_set(hapi_haptic *haptic, uint32_t index, const hapi_pointer_setting *setting,
+                   const hapi_tool_hull *hull)
 {
   if (hapi_tape_records(haptic->tape)) {
     hapi_pointer_setting copy = *setting;
+    hapi_tool_hull points = *hull;
+    if ((setting->mask & HAP_SET_SHAPE) == 0) {
+      copy.def.hull_points = 0; /* no points follow */
+    }
     setting_move(haptic->tape, index, &copy);
+    if ((setting->mask & HAP_SET_SHAPE) != 0) {
+      hull_move(haptic->tape, index, &points);
+    }
   }
 }
 
-bool hapi_tape_next_set(hapi_haptic *haptic, uint32_t index, hapi_pointer_setting *out)
+bool hapi_tape_next_set(hapi_haptic *haptic, uint32_t index, hapi_pointer_setting *out,
+                        hapi_tool_hull *out_hull)
 {
   hapi_tape *tape = haptic->tape;
   if (!hapi_tape_next_is(tape, HAPI_CELL_SET) ||
@@ -234,6 +248,11 @@ bool hapi_tape_next_set(hapi_haptic *haptic, uint32_t index, hapi_pointer_settin
   }
   memset(out, 0, sizeof *out);
   setting_move(tape, index, out);
+  memset(out_hull, 0, sizeof *out_hull);
+  if ((out->mask & HAP_SET_SHAPE) != 0) {
+    hull_count(out->def.hull_points, out_hull);
+    hull_move(tape, index, out_hull);
+  }
   return !tape->broken;
 }
 
@@ -293,7 +312,7 @@ void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *
   }
   if (force->u[6] != hash) {
     hapi_difference difference = {.what = HAPI_DIFFERS_POINTER,
-                                  .number = ((uint64_t)p->generation << 32) | (index + 1)};
+                                  .number = hapi_pointer_id_of(p->generation, index + 1)};
     cell_compare(haptic, &difference, force, wrench, 6);
   }
   if (hapi_tape_next_is(tape, HAPI_CELL_REACHED)) {

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/pointer_id.h"
 #include "base/vec.h"
 #include "haptic/haptic_internal.h"
 
@@ -70,7 +71,7 @@ static void touches_publish(hapi_haptic *haptic, hapi_told_things *told)
   for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
     hapi_told_list *list = &told->of_pointers[i];
     unsigned place = hapi_triple_back(&list->buffer);
-    list->generations[place] = told->telling.lists[i].generation;
+    list->generations[place] = told->telling.lists[i].generation & HAPI_GENERATION_MASK;
     list->counts[place] = hapi_telling_touches(&told->telling, i, touches_in(told, i, place));
     hapi_triple_publish(&list->buffer);
   }

@@ -9,6 +9,7 @@
 #include "base/assert.h"
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/pointer_id.h"
 #include "base/pose.h"
 #include "base/vec.h"
 #include "near/ahead.h"
@@ -352,7 +353,7 @@ static double hit_friction(hapi_nearby *nearby, const hapi_hit *hit,
   if (nearby->world->ode.pointer_surface == NULL) {
     return mu;
   }
-  hap_pointer_id id = {((uint64_t)pointer->generation << 32) | (hit->pointer + 1)};
+  hap_pointer_id id = {hapi_pointer_id_of(pointer->generation, hit->pointer + 1)};
   nearby->world->ode.pointer_surface(nearby->world->ode.user, id, hit->geom, &mu);
   if (!(mu >= 0.0 && mu <= DBL_MAX)) { /* NaN too */
     nearby->cycle->config->report(

@@ -66,7 +66,6 @@ void hapi_frame_unclutch(hapi_pointer *pointer, bool leaps)
 void hapi_frame_clutch(hapi_pointer *pointer, bool holds)
 {
   frame_use(pointer)->clutched = holds;
-  pointer->guard.fades = holds;
 }
 
 void hapi_frame_set_scale(hapi_pointer *pointer, double motion_scale, bool stands)

@@ -206,7 +206,7 @@ typedef struct hapi_rigid_move {
 /* What the guard keeps of a pointer. Device frame and units where nothing else is said; zeroed: a
  * pointer that has just come. */
 typedef struct hapi_guard_pointer {
-  bool fades;         /* the ramp goes down: the clutch is held */
+  bool fades;         /* the ramp goes down: a clutch is held, or a shape waits */
   double share;       /* 0..1, of the ramp-in */
   double late_loss;   /* 0..1, share of the force that late ticks have taken */
   bool placed;        /* position and moved are of the device as it is now */

@@ -37,7 +37,8 @@ typedef enum hapi_cell_kind {
   HAPI_CELL_BODY = 9,    /* d[0..2] position, d[3..6] quaternion; word: slot */
   HAPI_CELL_HULL = 10,   /* behind the JOINs of a pointer that is one: d[0..2] a vertex, d[3..5] the
                             next one */
-  HAPI_CELL_SET = 11,    /* before the POSE: HAPI_SET_CELLS of them, a hapi_pointer_setting */
+  HAPI_CELL_SET = 11,    /* before the POSE: HAPI_SET_CELLS of them, a hapi_pointer_setting; then
+                            HULLs where it has a hull */
   /* physics: WORLD, then CYCLE and CYCLED in turn, the one at the begin and the other at the end */
   HAPI_CELL_WORLD =
       16, /* hapi_world_word; flags: hap_model, and in the high byte the position of the dials + 1;
@@ -191,8 +192,8 @@ static_assert(sizeof(hapi_pointer_setting) <= HAPI_SET_CELLS * HAPI_CELL_BYTES,
 #define HAPI_HULL_CELLS(points) (((uint32_t)(points) + 1u) / 2u)
 
 /* Of a tick with everything in it; 64 vertices are the most. */
-#define HAPI_PACKET_MAX                                                             \
-  (1u + 16u * (1u + HAPI_JOIN_CELLS + HAPI_HULL_CELLS(64u) + HAPI_SET_CELLS + 4u) + \
+#define HAPI_PACKET_MAX                                                                  \
+  (1u + 16u * (1u + HAPI_JOIN_CELLS + 2u * HAPI_HULL_CELLS(64u) + HAPI_SET_CELLS + 4u) + \
    HAPI_CELL_BODIES)
 
 #endif

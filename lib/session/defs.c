@@ -78,6 +78,9 @@ static const hap_pointer_settings pointer_settings_defaults = {
     .stiffness = 1000.0,
     .max_force = 20.0,
     .max_torque = 1.0,
+    .radius = 0.01,
+    .collide_bits = 0xffffffffu,
+    .coupling = HAP_COUPLING_AUTO,
 };
 
 const hapi_def_type hapi_session_def_type = HAPI_DEF_TYPE(hap_session_def, session_defaults);

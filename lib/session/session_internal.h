@@ -93,6 +93,9 @@ hap_status hapi_session_say_why_not(const hap_session *session, hap_pointer_id p
 hap_status hapi_session_read_pointer(const hap_pointer_def *given, hapi_pointer_setup *out,
                                      hap_detail *detail);
 hap_status hapi_session_check_pointer(const hapi_pointer_setup *def, hap_detail *detail);
+/* Whether the session's model has the coupling. */
+hap_status hapi_session_check_coupling(const hap_session *session, const hapi_pointer_setup *setup,
+                                       hap_detail *detail);
 /* What is set while a pointer runs: a fault in any field, also in those that are not set. */
 hap_status hapi_session_check_setting(const hapi_pointer_setting *setting, hap_detail *detail);
 hap_status hapi_session_check_hull(const hapi_pointer_setup *def, hap_detail *detail);

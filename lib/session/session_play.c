@@ -250,10 +250,10 @@ static hap_status run_ready_passes(hap_player *player, hap_detail *detail)
 /* ---- a tick ---- */
 
 /* The vertices are in the HULL cells behind the JOINs. */
-static bool read_hull(const hapi_cell *cells, uint32_t count, hapi_joined *io,
+static bool read_hull(const hapi_cell *cells, uint32_t count, hapi_pointer_setup *io,
                       double points[HAPI_TOOL_POINTS_MAX + 1][3])
 {
-  size_t wanted = io->def.hull_points;
+  size_t wanted = io->hull_points;
   if (wanted > HAPI_TOOL_POINTS_MAX || HAPI_HULL_CELLS(wanted) > count) {
     return false;
   }
@@ -263,7 +263,7 @@ static bool read_hull(const hapi_cell *cells, uint32_t count, hapi_joined *io,
     }
     memcpy(points[2 * i], cells[i].d, 6 * sizeof(double));
   }
-  io->def.hull_xyz = wanted > 0 ? &points[0][0] : NULL;
+  io->hull_xyz = wanted > 0 ? &points[0][0] : NULL;
   return true;
 }
 
@@ -283,7 +283,7 @@ static hap_status check_join(const hap_player *player, const hapi_cell *cells, u
   bool good = cells[0].index < player->session->def.max_pointers && joined.generation != 0 &&
               joined.def.cookie == HAPI_POINTER_COOKIE && joined.def.device == NULL &&
               joined.def.hull_xyz == NULL &&
-              read_hull(cells + HAPI_JOIN_CELLS, count - HAPI_JOIN_CELLS, &joined, points) &&
+              read_hull(cells + HAPI_JOIN_CELLS, count - HAPI_JOIN_CELLS, &joined.def, points) &&
               hapi_device_figures_good(figures, sizeof figures / sizeof figures[0]) &&
               memchr(info->name, '\0', sizeof info->name) != NULL;
   if (joined.has_device != 0 && joined.def.velocity == HAP_VELOCITY_ESTIMATED) {
@@ -295,8 +295,10 @@ static hap_status check_join(const hap_player *player, const hapi_cell *cells, u
   return HAP_OK;
 }
 
-static hap_status check_set(const hap_player *player, const hapi_cell *cells, hap_detail *detail)
+static hap_status check_set(const hap_player *player, const hapi_cell *cells, uint32_t count,
+                            hap_detail *detail)
 {
+  double points[HAPI_TOOL_POINTS_MAX + 1][3];
   char bytes[HAPI_SET_CELLS * HAPI_CELL_BYTES];
   hapi_pointer_setting setting;
   for (uint32_t i = 0; i < HAPI_SET_CELLS; ++i) {
@@ -305,7 +307,8 @@ static hap_status check_set(const hap_player *player, const hapi_cell *cells, ha
   memcpy(&setting, bytes, sizeof setting);
   bool good = cells[0].index < player->session->def.max_pointers &&
               setting.def.cookie == HAPI_POINTER_COOKIE && setting.def.device == NULL &&
-              setting.def.hull_xyz == NULL && setting.def.hull_points == 0 &&
+              setting.def.hull_xyz == NULL &&
+              read_hull(cells + HAPI_SET_CELLS, count - HAPI_SET_CELLS, &setting.def, points) &&
               hapi_session_check_setting(&setting, NULL) >= HAP_OK;
   return good ? HAP_OK : play_contradicts(player, "a setting that there cannot be", detail);
 }
@@ -340,7 +343,7 @@ static hap_status check_packet(const hap_player *player, const hapi_cell *cells,
       i += HAPI_JOIN_CELLS - 1;
     } else if (cells[i].kind == HAPI_CELL_SET) {
       HAPI_TRY(has_cells(&cells[i], count - i, HAPI_SET_CELLS)
-                   ? check_set(player, &cells[i], detail)
+                   ? check_set(player, &cells[i], count - i, detail)
                    : play_contradicts(player, "a setting comes in part", detail));
       i += HAPI_SET_CELLS - 1;
     }

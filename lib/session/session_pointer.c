@@ -99,6 +99,16 @@ hap_status hapi_session_read_pointer(const hap_pointer_def *given, hapi_pointer_
   return hapi_session_check_pointer(out, detail);
 }
 
+hap_status hapi_session_check_coupling(const hap_session *session, const hapi_pointer_setup *setup,
+                                       hap_detail *detail)
+{
+  return !hapi_coupling_has_spring(setup->coupling) || session->def.model == HAP_MODEL_CONTACT
+             ? HAP_OK
+             : hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
+                         "coupling %s needs model contact; the session has model %s",
+                         hap_coupling_name(setup->coupling), hap_model_name(session->def.model));
+}
+
 hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap_pointer_id *out)
 {
   HAPI_TRY(hapi_session_may_change(session));
@@ -109,11 +119,8 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
   hapi_pointer_setup setup = {0};
   out->v = 0;
   hap_status status = hapi_session_read_pointer(def, &setup, &detail);
-  if (status >= HAP_OK && hapi_coupling_has_spring(setup.coupling) &&
-      session->def.model != HAP_MODEL_CONTACT) {
-    status = hapi_fail(&detail, HAP_ERROR_UNSUPPORTED,
-                       "coupling %s needs model contact; the session has model %s",
-                       hap_coupling_name(setup.coupling), hap_model_name(session->def.model));
+  if (status >= HAP_OK) {
+    status = hapi_session_check_coupling(session, &setup, &detail);
   }
   if (status >= HAP_OK) {
     hapi_quat_normalize(setup.pose_world_device.quat_wxyz);

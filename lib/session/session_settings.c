@@ -12,9 +12,10 @@
 
 /* What an application sets of a pointer that runs. */
 
-#define SETTINGS_BITS                                                              \
-  (HAP_SET_BASE | HAP_SET_MOTION_SCALE | HAP_SET_FORCE_SCALE | HAP_SET_STIFFNESS | \
-   HAP_SET_DAMPING | HAP_SET_FRICTION | HAP_SET_LIMITS | HAP_SET_UNCLUTCHED | HAP_SET_TELEPORT)
+#define SETTINGS_BITS                                                                            \
+  (HAP_SET_BASE | HAP_SET_MOTION_SCALE | HAP_SET_FORCE_SCALE | HAP_SET_STIFFNESS |               \
+   HAP_SET_DAMPING | HAP_SET_FRICTION | HAP_SET_LIMITS | HAP_SET_UNCLUTCHED | HAP_SET_TELEPORT | \
+   HAPI_SET_SWAP)
 #define SETTINGS_FIELDS (SETTINGS_BITS & ~(HAP_SET_UNCLUTCHED | HAP_SET_TELEPORT))
 #define BASE_TIME_MOST (INT64_MAX / 4) /* ns */
 
@@ -22,7 +23,11 @@ hap_status hapi_session_check_setting(const hapi_pointer_setting *setting, hap_d
 {
   hapi_pointer_setup def = setting->def;
   const hap_twist *twist = &setting->twist_world_device;
-  def.radius = fmax(def.radius, 1e-6); /* is not set; of a hull it may be 0 */
+  if ((setting->mask & HAP_SET_SHAPE) == 0) { /* as it was; of a hull the radius may be 0 */
+    def.hull_xyz = NULL;
+    def.hull_points = 0;
+    def.radius = fmax(def.radius, 1e-6);
+  }
   const char *wrong =
       (setting->mask & ~(uint32_t)(SETTINGS_BITS | HAPI_SET_CLUTCH)) != 0
           ? "mask has bits that there are not"
@@ -39,9 +44,16 @@ hap_status hapi_session_check_setting(const hapi_pointer_setting *setting, hap_d
                        : hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s", wrong);
 }
 
-static hap_status settings_merge(const void *of, hapi_pointer_setting *io, hap_detail *detail)
+typedef struct settings_given {
+  const hap_session *session;
+  const hap_pointer_settings *settings;
+} settings_given;
+
+static hap_status settings_merge(const void *of, hapi_pointer_setting *io, hapi_tool_hull *io_hull,
+                                 hap_detail *detail)
 {
-  const hap_pointer_settings *s = of;
+  const settings_given *from = of;
+  const hap_pointer_settings *s = from->settings;
   const hapi_pointer_setup given = {
       .pose_world_device = s->pose_world_device,
       .motion_scale = s->motion_scale,
@@ -52,6 +64,12 @@ static hap_status settings_merge(const void *of, hapi_pointer_setting *io, hap_d
       .finger_radius = s->finger_radius,
       .max_force = s->max_force,
       .max_torque = s->max_torque,
+      .radius = s->radius,
+      .hull_points = s->hull_points,
+      .collide_bits = s->collide_bits,
+      .coupling = s->coupling,
+      .coupling_stiffness = s->coupling_stiffness,
+      .coupling_damping = s->coupling_damping,
   };
   io->mask = s->mask;
   hapi_settings_copy(s->mask, &given, &io->def);
@@ -59,7 +77,17 @@ static hap_status settings_merge(const void *of, hapi_pointer_setting *io, hap_d
     io->twist_world_device = s->twist_world_device;
     io->base_time_ns = s->base_time_ns;
   }
+  io->def.hull_xyz = (s->mask & HAP_SET_SHAPE) != 0 ? s->hull_xyz : NULL;
   HAPI_TRY(hapi_session_check_setting(io, detail));
+  HAPI_TRY(hapi_session_check_coupling(from->session, &io->def, detail));
+  if ((s->mask & HAP_SET_SHAPE) != 0) {
+    memset(io_hull, 0, sizeof *io_hull);
+    io_hull->count = (uint32_t)s->hull_points;
+    if (s->hull_points > 0) {
+      memcpy(io_hull->points, s->hull_xyz, 3 * s->hull_points * sizeof(double));
+    }
+  }
+  io->def.hull_xyz = NULL;
   hapi_quat_normalize(io->def.pose_world_device.quat_wxyz);
   return HAP_OK;
 }
@@ -83,7 +111,8 @@ hap_status hap_pointer_set(hap_session *session, hap_pointer_id pointer,
   if (status < HAP_OK) {
     return hapi_session_note(session, status, &detail);
   }
-  return setting_give(session, pointer, settings_merge, &known);
+  const settings_given given = {session, &known};
+  return setting_give(session, pointer, settings_merge, &given);
 }
 
 hap_status hap_pointer_settings_get(const hap_session *session, hap_pointer_id pointer,
@@ -97,7 +126,7 @@ hap_status hap_pointer_settings_get(const hap_session *session, hap_pointer_id p
   HAPI_TRY(hapi_session_say_why_not(session, pointer,
                                     hapi_haptic_get_settings(session->haptic, pointer, &setting)));
   const hap_pointer_settings known = {
-      .mask = SETTINGS_FIELDS,
+      .mask = SETTINGS_FIELDS & ~(setting.def.hull_points > 0 ? (uint32_t)HAP_SET_SHAPE : 0),
       .pose_world_device = setting.def.pose_world_device,
       .twist_world_device = setting.twist_world_device,
       .base_time_ns = setting.base_time_ns,
@@ -109,13 +138,20 @@ hap_status hap_pointer_settings_get(const hap_session *session, hap_pointer_id p
       .finger_radius = setting.def.finger_radius,
       .max_force = setting.def.max_force,
       .max_torque = setting.def.max_torque,
+      .radius = setting.def.radius,
+      .collide_bits = setting.def.collide_bits,
+      .coupling = setting.def.coupling,
+      .coupling_stiffness = setting.def.coupling_stiffness,
+      .coupling_damping = setting.def.coupling_damping,
   };
   return hapi_session_note(
       session, hapi_def_write(&hapi_pointer_settings_type, &known, out, &detail), &detail);
 }
 
-static hap_status clutch_merge(const void *of, hapi_pointer_setting *io, hap_detail *detail)
+static hap_status clutch_merge(const void *of, hapi_pointer_setting *io, hapi_tool_hull *io_hull,
+                               hap_detail *detail)
 {
+  (void)io_hull;
   (void)detail;
   io->mask = HAPI_SET_CLUTCH;
   io->clutched = *(const bool *)of;

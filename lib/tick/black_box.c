@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#include "base/pointer_id.h"
+
 void hapi_black_box_reset(hapi_black_box *box)
 {
   memset(box->rows, 0, (size_t)HAP_BLACK_BOX_TICKS * box->pointers * sizeof *box->rows);
@@ -24,7 +26,7 @@ static void tick_fill(hapi_black_box *box, const hapi_tick *tick)
       rows[count++] = (hap_black_box_row){
           .tick = tick->facts.tick - 1, /* the one that has just been run */
           .time_ns = tick->facts.now_ns,
-          .pointer.v = ((uint64_t)p->generation << 32) | (i + 1),
+          .pointer.v = hapi_pointer_id_of(p->generation, i + 1),
           .fault = (uint32_t)tick->guard.latch.fault,
           .guard = p->guard.flags,
           .pose = p->device.pose,

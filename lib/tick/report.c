@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/hash.h"
+#include "base/pointer_id.h"
 #include "base/vec.h"
 #include "pointer/coupling.h"
 
@@ -224,7 +225,8 @@ static void trail_pointers(const hapi_pointers *pointers, hapi_trail_pointer *pl
       store_quat(places[i].device_quat, p->handle.quat);
     }
     atomic_store_explicit(&places[i].proxied, p->proxied, memory_order_release);
-    atomic_store_explicit(&places[i].generation, p->generation, memory_order_release);
+    atomic_store_explicit(&places[i].generation, p->generation & HAPI_GENERATION_MASK,
+                          memory_order_release);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/pointer_id.h"
 #include "base/pose.h"
 #include "base/vec.h"
 #include "local/touch_place.h"
@@ -79,7 +80,7 @@ static void felt_say(const listening *at, const hapi_felt *felt, hap_event_kind 
   }
   hap_event event = {.kind = (uint32_t)kind,
                      .time_ns = at->tick->facts.now_ns,
-                     .pointer.v = ((uint64_t)at->list->generation << 32) | (at->index + 1),
+                     .pointer.v = hapi_pointer_id_of(at->list->generation, at->index + 1),
                      .geom = felt->told.geom,
                      .body = felt->told.body,
                      .speed = speed,
@@ -280,7 +281,7 @@ static void buttons_follow(const listening *at)
                 &(hap_event){.kind = HAP_EVENT_BUTTON,
                              .number = i,
                              .time_ns = at->tick->facts.now_ns,
-                             .pointer.v = ((uint64_t)at->list->generation << 32) | (at->index + 1),
+                             .pointer.v = hapi_pointer_id_of(at->list->generation, at->index + 1),
                              .is_down = at->list->buttons >> i & 1u});
     }
   }
@@ -296,7 +297,7 @@ static void fault_follow(hapi_telling *telling, const hapi_tick *tick, hapi_even
               &(hap_event){.kind = HAP_EVENT_FAULT,
                            .number = (uint32_t)latch->fault,
                            .time_ns = tick->facts.now_ns,
-                           .pointer.v = ((uint64_t)latch->generation << 32) | latch->pointer});
+                           .pointer.v = hapi_pointer_id_of(latch->generation, latch->pointer)});
   }
 }
 
