@@ -132,6 +132,15 @@ HAP_NODISCARD HAP_API hap_status hap_session_adopt_body(hap_session *session, dB
  * destroyed comes in again as a new one. */
 HAP_API hap_status hap_session_forget_body(hap_session *session, dBodyID body);
 
+/* [locked] Puts a known body somewhere else at once: pose of the body in the world, m. A pose that
+ * dBodySetPosition sets counts as a way that the body went in a step, and is drawn so; here is
+ * none. The body is drawn at the new place from the next frame on, and keeps the velocity that ODE
+ * has of it. What a hand felt of it ends; at the new place it is a new body, which comes in over 20
+ * ms. HAP_ERROR_ARGUMENT, and nothing is moved: the position is not finite or beyond 1e6 m, the
+ * quaternion not unit within 1e-3. HAP_ERROR_NOT_FOUND: the session does not know the body. */
+HAP_API hap_status hap_session_teleport_body(hap_session *session, dBodyID body,
+                                             const hap_pose *pose);
+
 /* [locked] Before dGeomDestroy of a geom that a pointer may be near to, and after a change of a
  * mesh's triangles. Without it the next step notices the first. Of the second it notices only what
  * shows in 16 triangles spread over the mesh. */

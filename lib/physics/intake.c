@@ -124,6 +124,21 @@ hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
   return status;
 }
 
+hap_status hapi_physics_teleport(hapi_physics *physics, struct dxBody *body, const hap_pose *pose)
+{
+  const hapi_watch watch = physics->watch; /* of what is traced the entry stays the same */
+  pthread_mutex_lock(&physics->drawing.lock);
+  bool known = hapi_bodies_find(&physics->world.bodies, body) != HAPI_NONE;
+  if (known) {
+    dBodySetPosition(body, pose->position[0], pose->position[1], pose->position[2]);
+    dBodySetQuaternion(body, pose->quat_wxyz);
+    (void)hapi_bodies_renew(&physics->world.bodies, body);
+    physics->watch = watch;
+  }
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return known ? HAP_OK : HAP_ERROR_NOT_FOUND;
+}
+
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
 {
   physics->world.bodies.geoms_forgotten = true;

@@ -67,6 +67,8 @@ bool hapi_physics_steps_to_now(const hapi_physics *physics);
 bool hapi_physics_may_edit(hapi_physics *physics);
 hap_status hapi_physics_adopt(hapi_physics *physics, struct dxBody *body);
 hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body);
+/* The body is where it was put, and did not go there. */
+hap_status hapi_physics_teleport(hapi_physics *physics, struct dxBody *body, const hap_pose *pose);
 hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,
                                            void (*callback)(struct dxBody *));
 hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const *bodies,

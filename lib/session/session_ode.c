@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
+#include "base/plausible.h"
 #include "session/session_internal.h"
 
 /* What is kept of the last ticks for drawing: as long as poses.c may lie behind and more, in rows
@@ -222,6 +223,17 @@ hap_status hap_session_forget_body(hap_session *session, dBodyID body)
 {
   HAPI_TRY(may_edit(session, body));
   return hapi_session_say(session, hapi_physics_forget(session->physics, body), __func__);
+}
+
+hap_status hap_session_teleport_body(hap_session *session, dBodyID body, const hap_pose *pose)
+{
+  HAPI_TRY(may_edit(session, body));
+  if (pose == NULL || !hapi_plausible_pose(pose)) {
+    return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
+                             "the pose is NULL, its position is not finite or beyond 1000 km, or "
+                             "its quaternion is not unit; the body stays where it was");
+  }
+  return hapi_session_say(session, hapi_physics_teleport(session->physics, body, pose), __func__);
 }
 
 hap_status hap_session_forget_geom(hap_session *session, dGeomID geom)

@@ -9,14 +9,6 @@
 #include "haptic/coupling_gains.h"
 #include "session/session_internal.h"
 
-/* False for NaN. What the loop would take for an error is not let in. */
-static bool pose_is_good(const hap_pose *pose)
-{
-  const double *q = pose->quat_wxyz;
-  double n2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-  return hapi_plausible(pose->position, 3) && fabs(n2 - 1.0) < 1e-3;
-}
-
 hap_status hapi_session_check_pointer(const hapi_pointer_setup *d, hap_detail *detail)
 {
   const hapi_number_rule rules[] = {
@@ -45,7 +37,7 @@ hap_status hapi_session_check_pointer(const hapi_pointer_setup *d, hap_detail *d
                           ? "velocity is HAP_VELOCITY_ESTIMATED, which needs a device"
                       : d->coupling_damping > 0.0 && d->coupling_stiffness == 0.0
                           ? "coupling_damping is given without coupling_stiffness"
-                      : !pose_is_good(&d->pose_world_device)
+                      : !hapi_plausible_pose(&d->pose_world_device)
                           ? "pose_world_device is not within 1000 km with a unit quaternion"
                           : NULL;
   return wrong == NULL ? hapi_session_check_hull(d, detail)
@@ -168,7 +160,7 @@ hap_status hap_pointer_set_target(hap_session *session, hap_pointer_id pointer,
   if (pose == NULL) {
     return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }
-  if (!pose_is_good(pose)) {
+  if (!hapi_plausible_pose(pose)) {
     return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
                              "the target's position is not finite or beyond 1000 km, or its "
                              "quaternion is not unit; the pointer stays where it was");

@@ -143,6 +143,27 @@ static void follow_life(hapi_body_table *table, uint32_t index)
   }
 }
 
+uint32_t hapi_bodies_renew(hapi_body_table *table, dBodyID body)
+{
+  uint32_t index = hapi_bodies_find(table, body);
+  if (index == HAPI_NONE) {
+    return HAPI_NONE;
+  }
+  hapi_known_body *known = &table->entries[index];
+  hapi_known_body before = *known;
+  hapi_known_rest rest = *known->rest;
+  hapi_sleep_give_back(known);
+  drop_entry(table, index);
+  begin_entry(table, known, body);
+  known->found = before.found;
+  known->seen = before.seen;
+  known->next = before.next;
+  known->rest->adopted = rest.adopted;
+  known->rest->moved_callback = rest.moved_callback;
+  table->listener->body_begun(table->listener->physics, index);
+  return index;
+}
+
 static uint32_t find_living(hapi_body_table *table, dBodyID body)
 {
   uint32_t index = hapi_bodies_find(table, body);

@@ -141,6 +141,8 @@ uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_N
  * cycle, when what the application has moved counts. */
 hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle, bool syncs);
 hap_status hapi_bodies_adopt(hapi_body_table *table, dBodyID body);
+/* To all but the application the body is a new one from now on. HAPI_NONE: it is not known. */
+uint32_t hapi_bodies_renew(hapi_body_table *table, dBodyID body);
 hap_status hapi_bodies_forget(hapi_body_table *table, dBodyID body);
 /* Whose the body of an entry is: the loop's, which touched it, or ODE's. */
 void hapi_bodies_own(hapi_body_table *table, uint32_t index, bool loop_owned, bool loop_touched);
