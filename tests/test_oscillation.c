@@ -174,6 +174,205 @@ TEST(a_measuring_guard_takes_nothing)
   CHECK(!swing_took() && f.tick.guard.latch.fault == HAP_FAULT_NONE);
 }
 
+/* ---- what each number of the rule means ---- */
+
+/* From one force to the other and not beyond, along a spring of 1000 N/m. */
+static void half_swing(double from, double to, double seconds)
+{
+  int ticks = (int)(seconds / T + 0.5);
+  for (int i = 1; i <= ticks; ++i) {
+    double force = from + 0.5 * (to - from) * (1.0 - cos(M_PI * i / ticks));
+    swing_tick(force, -1e-3 * force, 0.0);
+  }
+}
+
+TEST(each_half_of_a_swing_takes_half_of_what_is_left_up_to_nine_tenths)
+{
+  hapi_pointer *p = swing_pointer();
+  double most = 0.0;
+  double steepest = 0.0;
+  for (int i = 0; i < 40 && f.tick.guard.latch.fault == HAP_FAULT_NONE; ++i) {
+    for (int k = 0; k < 42; ++k) {
+      double before = p->guard.swings.taken;
+      double force = (i % 2 == 0 ? 3.0 : -3.0) * cos(M_PI * k / 42.0);
+      swing_tick(force, -1e-3 * force, 0.0);
+      steepest = fmax(steepest, p->guard.swings.taken - before);
+      most = fmax(most, p->guard.swings.taken);
+    }
+  }
+  CHECK(f.tick.guard.latch.fault == HAP_FAULT_OSCILLATION);
+  CHECK_NEAR(most, 0.9, 1e-9);
+  CHECK_NEAR(steepest, T / 0.02, 1e-9); /* all of it in 20 ms */
+}
+
+TEST(a_half_of_a_swing_is_forgotten_in_five_seconds)
+{
+  const hapi_pointer *p = swing_pointer();
+  swing_for(0.42, 12.0, 0.003, 0.0);
+  double counted = p->guard.swings.counted;
+  CHECK(counted > 1.0);
+  swing_for(4.0, 1.0, 0.001, 0.0);
+  CHECK_NEAR(p->guard.swings.counted, counted - 4.0 / 5.0, 1e-3);
+}
+
+/* 12 N, 6 N, 6 N, 12 N, and so on for ever: of six in a row no two ends are less than the begin. */
+TEST(halves_that_are_not_alike_are_no_swing)
+{
+  static const double ends[] = {6.0, -6.0, 0.0, -6.0};
+  (void)swing_pointer();
+  for (int i = 0; i < 60; ++i) {
+    half_swing(ends[i % 4], ends[(i + 1) % 4], 0.04);
+  }
+  CHECK(!swing_took());
+}
+
+/* The energy of a half: a spring that swings by 3 mm and 3 N to either side has 4.5 mJ. */
+TEST(a_swing_may_be_given_a_seventh_of_its_energy)
+{
+  for (int much = 0; much < 2; ++much) {
+    hapi_pointer *p = swing_pointer();
+    double share = much != 0 ? 0.2 : 0.1;
+    for (int i = 0; i < 2000; ++i) {
+      double phase = 2.0 * M_PI * 12.5 * i * T; /* 40 ticks a half */
+      p->guard.swings.given += share * 4.5e-3 / 40.0;
+      swing_tick(-3.0 * sin(phase), 0.003 * sin(phase), 0.0);
+    }
+    CHECK(swing_took() == (much == 0));
+  }
+}
+
+/* At a pace in Hz, and what a contact adds at 35 Hz. late: the sine of its delay there. */
+static void late_swing(double hz, double late)
+{
+  (void)swing_pointer();
+  for (int i = 0; i < 4000; ++i) {
+    double w = 2.0 * M_PI * hz * T * i;
+    double high = 2.0 * M_PI * 35.0 * T * i;
+    double way = 0.006 * sin(w) + 6e-4 * (sqrt(1.0 - late * late) * sin(high) - late * cos(high));
+    swing_tick(-6.0 * sin(w) - 0.6 * sin(high), way, 0.0);
+  }
+}
+
+TEST(a_slow_swing_is_a_hands_however_late_the_device_is)
+{
+  late_swing(4.0, 0.3);
+  CHECK(swing_took());
+  late_swing(3.0, 0.3);
+  CHECK(!swing_took());
+}
+
+/* The half tick for which a force is held on the mean is 0.11 there, and not the device's. */
+TEST(a_little_delay_is_no_late_device)
+{
+  late_swing(7.0, 0.3);
+  CHECK(swing_took());
+  late_swing(7.0, 0.15);
+  CHECK(!swing_took());
+}
+
+/* The force stays at the limit for 50 ms: the half ends where it has turned. */
+TEST(a_half_ends_at_the_end_of_a_force_that_stays)
+{
+  const hapi_swing_axis *axis = &swing_pointer()->guard.swings.force[0];
+  half_swing(0.0, 10.0, 0.05);
+  for (int i = 0; i < 50; ++i) {
+    swing_tick(10.0, -0.01 - 1e-5 * i, 0.0);
+  }
+  half_swing(10.0, -10.0, 0.05);
+  CHECK_NEAR(axis->turn.seconds, 0.1, 1e-9);
+  CHECK_NEAR(axis->turn.way, -0.01049, 1e-12);
+}
+
+TEST(a_tool_swings_by_its_torque_where_it_is_felt)
+{
+  static const hapi_tool_hull hull;
+  for (int kind = 0; kind < 3; ++kind) {
+    hapi_pointer *p = swing_pointer();
+    double w = 2.0 * M_PI * 12.0;
+    p->shape.hull = kind == 1 ? NULL : &hull;
+    p->shape.extent = 0.05; /* and 1000 N/m: 2.5 N m/rad */
+    p->device.feels_torque = kind != 2;
+    p->device.limits.max_torque = 1.0;
+    for (int i = 0; i < 420; ++i) {
+      double angle = 0.1 * sin(w * i * T);
+      hapi_v3_set(p->wrench.torque, 0.0, -2.5 * angle, 0.0);
+      hapi_v3_set(p->handle.spin, 0.0, 0.1 * w * cos(w * (i - 0.5) * T), 0.0);
+      swing_tick(0.0, 0.0, 0.0);
+    }
+    CHECK(swing_took() == (kind == 0));
+  }
+}
+
+/* ---- running away, by what it gains against the force ---- */
+
+/* 1/kg: of the speed's square for each J, while the force is below bend, and beyond. */
+typedef struct runaway_law {
+  double bend; /* N */
+  double below;
+  double beyond;
+  double left; /* of the acceleration, when the force is taken away */
+} runaway_law;
+
+typedef struct runaway_found {
+  double asked_n; /* N, where force is taken away; 0: it was not */
+  int judged;     /* ticks from then to the fault; 0: there is none */
+} runaway_found;
+
+/* Until 6 N, along 1000 N/m, or 30 ticks without force. */
+static runaway_found runaway_run(const runaway_law *law)
+{
+  runaway_found out = {0.0, 0};
+  const hapi_pointer *p = swing_pointer();
+  double way = 1e-6;
+  double speed = 0.05;
+  int asked = 0;
+  while (1000.0 * way < 6.0 || (asked > 0 && asked < 30)) {
+    double force = 1000.0 * way;
+    double gain = force < law->bend ? law->below : law->beyond;
+    /* 1.6 N and 4.8 N are the levels, and 3.2 N the mean force between them */
+    double acceleration = asked > 0 ? law->left * 0.5 * law->beyond * 3.2 : 0.5 * gain * force;
+    swing_tick(-force, way, speed);
+    if (f.tick.guard.latch.fault != HAP_FAULT_NONE) {
+      out.judged = asked;
+      return out;
+    }
+    out.asked_n = asked == 0 && p->guard.swings.taken > 0.0 ? force : out.asked_n;
+    asked += out.asked_n > 0.0;
+    way += speed * T + 0.5 * acceleration * T * T;
+    speed += acceleration * T;
+  }
+  return out;
+}
+
+TEST(a_device_that_runs_away_is_asked_at_a_quarter_of_the_limit)
+{
+  runaway_found found = runaway_run(&(runaway_law){.beyond = 8.0});
+  CHECK(found.asked_n >= 0.24 * LIMIT && found.asked_n < 0.27 * LIMIT);
+  /* down in 5 ms, and a look of 6 ms */
+  CHECK_SAY(found.judged >= 10 && found.judged <= 12, "%d ticks", found.judged);
+}
+
+TEST(a_hand_with_a_device_is_heavier_than_a_kilogram)
+{
+  CHECK(runaway_run(&(runaway_law){.beyond = 2.0 / 0.8}).asked_n > 0.0);
+  CHECK(runaway_run(&(runaway_law){.beyond = 2.0 / 1.3}).asked_n == 0.0);
+}
+
+TEST(a_gain_that_falls_by_a_quarter_is_a_hands)
+{
+  CHECK(runaway_run(&(runaway_law){1.6, 8.0, 0.85 * 8.0, 0.0}).asked_n > 0.0);
+  CHECK(runaway_run(&(runaway_law){1.6, 8.0, 0.65 * 8.0, 0.0}).asked_n == 0.0);
+  /* below the first level nothing is compared */
+  CHECK(runaway_run(&(runaway_law){0.3, 32.0, 8.0, 0.0}).asked_n > 0.0);
+}
+
+TEST(a_device_that_keeps_half_of_its_acceleration_is_pushed)
+{
+  CHECK(runaway_run(&(runaway_law){.beyond = 8.0, .left = 0.3}).judged > 0);
+  runaway_found pushed = runaway_run(&(runaway_law){.beyond = 8.0, .left = 0.5});
+  CHECK(pushed.asked_n > 0.0 && pushed.judged == 0);
+}
+
 /* ---- devices ---- */
 
 static osc_result result;
