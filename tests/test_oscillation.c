@@ -241,6 +241,23 @@ TEST(a_swing_may_be_given_a_seventh_of_its_energy)
   }
 }
 
+/* In the models of the paper the bodies' power at the contacts is known. In model CONTACT the bodies
+ * themselves are. */
+TEST(moving_bodies_of_the_papers_models_feed_the_swing)
+{
+  static const hap_model models[] = {HAP_MODEL_ACCELERANCE, HAP_MODEL_CONTACT};
+  for (int k = 0; k < 2; ++k) {
+    hapi_pointer *p = swing_pointer();
+    f.tick.facts.model = models[k];
+    p->guard.power = 0.2 * 4.5e-3 / 0.04;
+    for (int i = 0; i < 2000; ++i) {
+      double phase = 2.0 * M_PI * 12.5 * i * T;
+      swing_tick(-3.0 * sin(phase), 0.003 * sin(phase), 0.0);
+    }
+    CHECK(swing_took() == (models[k] == HAP_MODEL_CONTACT));
+  }
+}
+
 /* At a pace in Hz, and what a contact adds at 35 Hz. late: the sine of its delay there. */
 static void late_swing(double hz, double late)
 {

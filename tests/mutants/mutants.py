@@ -31,7 +31,7 @@ import subprocess
 import sys
 import time
 
-GUARD_TESTS = ["guard", "guard_session", "faults", "late", "false_input", "oscillation",
+GUARD_TESTS = ["guard", "guard_session", "faults", "late", "false_input", "oscillation", "declared",
                "session_devices"]
 WATCH_TESTS = ["emergency", "watchdog", "guard_session", "module", "faults_threads"]
 SPIDAR_TESTS = ["spidar_device", "spidar_errors", "spidar_frames", "spidar_emulator", "spidar",
