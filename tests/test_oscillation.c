@@ -241,7 +241,7 @@ TEST(a_swing_may_be_given_a_seventh_of_its_energy)
   }
 }
 
-/* In the models of the paper the bodies' power at the contacts is known. In model CONTACT the bodies
+/* In the models of the paper the power of bodies at contacts is known. In model CONTACT the bodies
  * themselves are. */
 TEST(moving_bodies_of_the_papers_models_feed_the_swing)
 {
@@ -367,6 +367,24 @@ TEST(a_device_that_runs_away_is_asked_at_a_quarter_of_the_limit)
   CHECK(found.asked_n >= 0.24 * LIMIT && found.asked_n < 0.27 * LIMIT);
   /* down in 5 ms, and a look of 6 ms */
   CHECK_SAY(found.judged >= 10 && found.judged <= 12, "%d ticks", found.judged);
+}
+
+/* What goes by time is given to the device as well. */
+TEST(a_device_runs_away_from_declared_forces_too)
+{
+  for (int any = 0; any < 2; ++any) {
+    hapi_pointer *p = swing_pointer();
+    double way = 1e-6;
+    double speed = 0.05;
+    for (int i = 0; i < 100 && 1000.0 * way < 6.0; ++i) {
+      p->declared.any = any != 0;
+      hapi_v3_set(p->declared.driven.force, -1000.0 * way, 0.0, 0.0);
+      swing_tick(0.0, way, speed);
+      way += speed * T;
+      speed += 4000.0 * way * T; /* of 0.25 kg */
+    }
+    CHECK(1000.0 * way >= 6.0 && swing_took() == (any != 0));
+  }
 }
 
 TEST(a_hand_with_a_device_is_heavier_than_a_kilogram)

@@ -8,9 +8,12 @@
 
 #include <math.h>
 
+#include "guard/energy_observer.h"
 #include "guard/force_guard.h"
+#include "haptic/haptic_internal.h"
 #include "local/contact_ramp.h"
 #include "pointer/coupling.h"
+#include "pointer/plausible.h"
 #include "tests/tick_world.h"
 
 /* ---- contacts that arrive deep ---- */
@@ -127,4 +130,252 @@ TEST(a_coordinate_or_a_speed_of_more_than_a_million_is_an_error)
       CHECK(hapi_coupling_read(&f.tick.pointers, f.now_ns, T, T, 0.02) == (beyond != 0 ? 1 : 0));
     }
   }
+}
+
+/* ---- a plausible input ---- */
+
+#define MS 1000000LL
+
+static const hapi_tool_hull any_hull;
+static hapi_pointer hand;
+static int64_t hand_ns;
+
+/* One read; true: it was believed. */
+static bool hand_tell(double x, double angle, int64_t after_ns)
+{
+  hand_ns += after_ns;
+  hapi_v3_set(hand.device.pose.position, x, 0.0, 0.0);
+  turn_to(&hand, angle);
+  return hapi_input_judge(&hand, hand_ns, false);
+}
+
+/* At rest for 25 ms, with a tool. */
+static void hand_rest(void)
+{
+  memset(&hand, 0, sizeof hand);
+  hand.device.speed_limit = 10.0;
+  hand.shape.hull = &any_hull;
+  hand.guard.share = 1.0;
+  hand_ns = 0;
+  for (int i = 0; i < 25; ++i) {
+    CHECK(hand_tell(0.0, 0.0, MS));
+  }
+}
+
+TEST(a_pose_that_is_false_goes_on_at_1_m_a_second_at_most)
+{
+  hand_rest();
+  for (int i = 1; i <= 30; ++i) { /* to 3 m/s by 100 m/s^2 */
+    CHECK(hand_tell(0.5 * 100.0 * 1e-6 * i * i, 0.0, MS));
+  }
+  double told = hand.device.pose.position[0];
+  CHECK(!hand_tell(told - 0.05, 0.0, MS));
+  CHECK_NEAR(hand.device.pose.position[0], told + 0.001, 1e-9);
+  CHECK_NEAR(hand.device.twist.linear[0], 1.0, 1e-9);
+}
+
+TEST(a_tool_changes_its_turning_by_50_rad_a_second_in_a_tick)
+{
+  hand_rest();
+  CHECK(hand_tell(0.0, 0.047, MS));
+  hand_rest();
+  CHECK(!hand_tell(0.0, 0.053, MS));
+}
+
+/* Poses that go on from another place are believed. Surfaces go there from half a mm on. */
+TEST(surfaces_go_with_a_jump_of_half_a_millimetre)
+{
+  for (int far = 0; far < 2; ++far) {
+    hand_rest();
+    hand.device.good.position[0] = far != 0 ? 0.0494 : 0.0496; /* where it was felt meanwhile */
+    hand.device.good.quat_wxyz[0] = 1.0;
+    for (int i = 0; i < 10 && !hand_tell(0.05, 0.0, MS); ++i) {
+      CHECK(!hand.belief.jumped);
+    }
+    CHECK(hand.device.pose.position[0] == 0.05 && hand.belief.jumped == (far != 0));
+  }
+}
+
+/* Every 4 ms, without a quantum. */
+TEST(steps_of_less_than_20_um_say_nothing_of_the_pace)
+{
+  for (int large = 0; large < 2; ++large) {
+    hand_rest();
+    for (int i = 0; i < 80; ++i) {
+      (void)hand_tell((large != 0 ? 25e-6 : 15e-6) * (double)(i / 4), 0.0, MS);
+    }
+    CHECK_NEAR(hapi_input_gap(&hand, T), large != 0 ? 0.004 : 0.0, 1e-12);
+  }
+}
+
+/* The hand has accelerated by 300 m/s^2 for 15 ms: half of that way, as what had begun before was
+ * seen. */
+TEST(a_hand_that_was_not_read_may_have_gone_by_300_m_a_second_squared)
+{
+  const double most = 0.5 * 300.0 * 0.015 * 0.015;
+  hand_rest();
+  CHECK(hand_tell(0.95 * most, 0.0, 15 * MS));
+  hand_rest();
+  CHECK(!hand_tell(1.05 * most, 0.0, 15 * MS));
+}
+
+TEST(nothing_is_known_of_a_hand_that_was_not_read_for_20_ms)
+{
+  hand_rest();
+  CHECK(!hand_tell(0.15, 0.0, 19 * MS));
+  hand_rest();
+  CHECK(hand_tell(0.15, 0.0, 21 * MS));
+}
+
+/* ---- the ledger of energy ---- */
+
+/* A hand of 1000 N/m at rest in a wall, the touch of which has just begun. */
+static hapi_pointer *ledger_wall(double depth)
+{
+  set_up();
+  f.tick.guard.mode = HAP_GUARD_ON;
+  hapi_pointer *p = add_pointer(0, -0.02, 0.0, 0.0);
+  p->device.limits.max_force = 20.0;
+  p->device.limits.slew_force = 1e6;
+  p->device.limits.slew_torque = 1e6;
+  f.model->model = HAP_MODEL_CONTACT;
+  begin_model();
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  model_adopt();
+  ticks_run(30);
+  f.tick.facts.physics_period = 0.0; /* the wall does not grow old */
+  p->device.pose.position[0] = -0.01 + depth;
+  return p;
+}
+
+TEST(a_debt_is_forgiven_in_a_touch_that_lasts_by_a_time_constant_of_300_ms)
+{
+  const hapi_guard *guard = &f.tick.guard;
+  (void)ledger_wall(0.002);
+  ticks_run(200);
+  f.tick.guard.balance = guard->sprung - 1e-3;
+  ticks_run(95);
+  CHECK_NEAR(guard->sprung - guard->balance, 1e-3, 1e-9);
+  ticks_run(305);
+  CHECK_NEAR(guard->sprung - guard->balance, 1e-3 * exp(-1.0), 2e-5);
+}
+
+/* 0.9 mm in, as often as wanted: 0.4 mJ in the spring, of which 0.6 % are less than 10 uJ. */
+TEST(a_hand_may_gain_10_uj_of_nothing)
+{
+  hapi_pointer *p = ledger_wall(0.0);
+  double gained = 0.0;
+  double most = 0.0;
+  for (int i = 0; i < 20000; ++i) {
+    double x = -0.01 + 0.0009 * sin(2.0 * M_PI * 7.0 * i * T);
+    gained += p->device.wrench.force[0] * (x - p->device.pose.position[0]);
+    p->device.pose.position[0] = x;
+    most = fmax(most, gained);
+    ticks_run(1);
+  }
+  CHECK_SAY(most > 5e-6 && most < 2e-5, "%g J", most);
+}
+
+/* J, of the body as it is turned now: each axis by itself. */
+static double spin_energy(const hapi_local_body *body, const double inertia[3])
+{
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    double axis[3] = {0.0, 0.0, 0.0};
+    axis[i] = 1.0;
+    hapi_quat_rotate(body->pose.quat_wxyz, axis, axis);
+    double along = hapi_v3_dot(axis, body->twist.angular);
+    sum += 0.5 * inertia[i] * along * along;
+  }
+  return sum;
+}
+
+/* The application turns it by a torque. Its work goes into the body, and the ledger has none. */
+TEST(what_turns_a_body_is_no_loan_of_the_ledger)
+{
+  static const double inertia[3] = {1e-3, 2e-3, 5e-3};
+  static const double torque[3] = {0.02, -0.01, 0.03};
+  (void)ledger_wall(0.002);
+  begin_model();
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  hapi_model_body *body = add_body(0);
+  body->flags = HAPI_BODY_OWNED;
+  body->mass = 1.0;
+  for (int i = 0; i < 3; ++i) {
+    body->inertia[4 * i] = inertia[i];
+    body->inverse_inertia[4 * i] = 1.0 / inertia[i];
+  }
+  body->linear_keep = body->angular_keep = 1.0;
+  body->max_angular_speed = HUGE_VAL;
+  body->pose.position[0] = 1.0;
+  hapi_v3_set(body->twist.angular, 1.0, 2.0, 2.5);
+  hapi_v3_copy(torque, body->user_wrench + 3);
+  model_adopt();
+  f.bodies[0].entered_model = 0; /* its contacts are known: none */
+  ticks_run(20);
+  const double *w = f.bodies[0].twist.angular;
+  double energy = spin_energy(&f.bodies[0], inertia);
+  double balance = f.tick.guard.balance;
+  double begun = energy;
+  for (int i = 0; i < 250; ++i) {
+    double before = hapi_v3_dot(torque, w);
+    ticks_run(1);
+    energy += 0.5 * T * (before + hapi_v3_dot(torque, w));
+    double lost = energy - spin_energy(&f.bodies[0], inertia);
+    CHECK_NEAR(f.tick.guard.balance - balance, lost, 1e-9);
+  }
+  CHECK(spin_energy(&f.bodies[0], inertia) > begun + 0.01);
+}
+
+TEST(a_tool_pays_for_its_torque_as_far_as_it_turns)
+{
+  for (int tool = 0; tool < 2; ++tool) {
+    hapi_pointer *p = coupling_pointer();
+    p->shape.hull = tool != 0 ? p->shape.hull : NULL;
+    p->guard.placed = true;
+    p->guard.quat[0] = 1.0;
+    hapi_v3_set(p->guard.contact.torque, 0.0, 0.0, 0.1);
+    turn_to(p, 0.01);
+    hapi_energy_observe(&f.tick.guard, &f.tick.facts, &f.tick.pointers, &f.tick.bodies,
+                        &f.tick.touches);
+    CHECK_NEAR(f.tick.guard.balance, tool != 0 ? -0.1 * 0.01 : 0.0, 1e-7);
+  }
+}
+
+/* F^2 / 2 k, m v^2 / 2, and of a tool the same of its turning. */
+TEST(what_is_stored_between_a_device_and_its_proxy)
+{
+  for (int tool = 0; tool < 2; ++tool) {
+    hapi_pointer *p = coupling_pointer();
+    p->shape.hull = tool != 0 ? p->shape.hull : NULL;
+    p->proxied = true;
+    p->coupling.stiffness = 800.0;
+    p->coupling.spin_stiffness = 2.0;
+    p->coupling.mass = 0.05;
+    p->coupling.inertia = 1e-4;
+    hapi_v3_set(p->wrench.force, 0.0, 4.0, 0.0);
+    hapi_v3_set(p->wrench.torque, 0.2, 0.0, 0.0);
+    hapi_v3_set(p->proxy.velocity, 0.0, 0.0, 0.3);
+    hapi_v3_set(p->proxy.spin, 0.0, 6.0, 0.0);
+    p->device.wrench.force[1] = 4.0;
+    hapi_energy_observe(&f.tick.guard, &f.tick.facts, &f.tick.pointers, &f.tick.bodies,
+                        &f.tick.touches);
+    double moved = 4.0 * 4.0 / 1600.0 + 0.5 * 0.05 * 0.3 * 0.3;
+    double turned = 0.2 * 0.2 / 4.0 + 0.5 * 1e-4 * 36.0;
+    CHECK_NEAR(f.tick.guard.stored_max, moved + (tool != 0 ? turned : 0.0), 1e-12);
+  }
+}
+
+/* ---- limits ---- */
+
+TEST(all_of_the_force_comes_in_2_ms_where_nobody_asks_for_more_time)
+{
+  hapi_pointer_slot slot;
+  memset(&slot, 0, sizeof slot);
+  slot.def.max_force = 15.0;
+  slot.def.max_torque = 0.6;
+  CHECK_NEAR(hapi_pointer_limits(&slot).slew_force, 15.0 / 0.002, 1e-9);
+  CHECK_NEAR(hapi_pointer_limits(&slot).slew_torque, 0.6 / 0.002, 1e-9);
+  slot.def.max_slew = 100.0;
+  CHECK_NEAR(hapi_pointer_limits(&slot).slew_force, 100.0, 0.0);
 }

@@ -587,9 +587,21 @@ static void cable_pull(hands *h)
   CHECK(!emulated_is_limp(&machine));
 }
 
+static int rescues_told;
+
+static void rescue_hear(hap_log_level level, const char *text, void *user)
+{
+  (void)user;
+  rescues_told += level == HAP_LOG_WARNING && strstr(text, "came back") != NULL;
+}
+
 TEST(boards_whose_cable_is_in_again_are_zeroed_by_the_guard)
 {
   hands h;
+  hap_hooks hooks;
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.log = rescue_hear;
+  REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
   cable_pull(&h); /* nobody does anything about it */
   plug_in();
   CHECK(emulated_await(&machine, true));
@@ -598,7 +610,10 @@ TEST(boards_whose_cable_is_in_again_are_zeroed_by_the_guard)
   }
   CHECK(status_explains(&h, "came back"));
   h.ops->stop(h.self);
+  CHECK(rescues_told == 0);
   CHECK(h.ops->start(h.self) == HAP_OK && hands_push(&h, 1.0, 5) == HAP_OK);
+  CHECK(rescues_told == 1 && !atomic_load(&pulse_of(&h)->rescued));
+  REQUIRE(hap_hooks_set(NULL) == HAP_OK);
   hap_device_close(h.device);
   CHECK(emulated_await(&machine, true));
 }
