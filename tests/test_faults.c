@@ -206,10 +206,10 @@ TEST(dropped_ticks_give_the_hand_no_more_than_the_force_held_over_one_gap)
       taps kept = tap_with_drops(HAP_GUARD_ON, hands[h], dropped[i]);
       printf("# %s, %d dropped: bare %.3g J, guarded %.3g, in one gap %.3g, stored %.3g\n",
              hands[h], dropped[i], bare.work, kept.work, kept.once, kept.stored);
-      if (dropped[i] <= 5) {
+      if (dropped[i] <= 20) {
         CHECK(kept.work <= 0.01 * kept.stored + kept.once);
       } else { /* the stiffness changes under load: some of it is the hand's */
-        CHECK(kept.work <= 0.07 * bare.work);
+        CHECK(kept.work <= 0.001 * bare.work);
       }
     }
   }

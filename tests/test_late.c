@@ -316,7 +316,19 @@ TEST(what_the_hand_went_in_a_gap_is_not_pressed_in_at_once)
   CHECK_NEAR(p->guard.wanted.force[0], -5.5, 1e-9); /* an eighth of the way */
   ticks_run(1);
   CHECK_NEAR(p->guard.wanted.force[0], -5.7, 1e-9); /* 0.2 m/s */
-  ticks_run(20);
+  /* The hand has paid 0 + 1 + 2 + 3 + 4 mJ on its way in, as each force was held for a tick, and
+   * 5 N over 4 mm in the gap: a spring of 1 kN/m is 7.746 mm deep then. */
+  ticks_run(100);
+  CHECK_NEAR(p->guard.wanted.force[0], -sqrt(2.0 * 1000.0 * 0.03), 1e-3);
+  double touch_s = f.tick.guard.touch_s;
+  CHECK(touch_s < 0.3);
+  ticks_run((int)lround((0.3 - touch_s) / T) + 150); /* the rest, within 0.3 s to 1 / e */
+  CHECK_NEAR(p->guard.wanted.force[0], -9.0 + 1.254 * exp(-0.5), 0.01);
+  double debt = f.tick.guard.sprung - f.tick.guard.balance;
+  printf("# %.3g mJ came in unpaid and not booked\n", 1e3 * debt);
+  CHECK(debt < 5e-4); /* 3 mJ where it is nobody's work */
+  CHECK(f.tick.guard.energy_ticks == 0);
+  ticks_run(9000);
   CHECK_NEAR(p->guard.wanted.force[0], -9.0, 1e-9);
   ticks_miss(7);
   p->device.pose.position[0] -= 4e-3; /* out: at once */
@@ -327,6 +339,57 @@ TEST(what_the_hand_went_in_a_gap_is_not_pressed_in_at_once)
   p->device.pose.position[0] += 1e-3;
   ticks_run(1);
   CHECK_NEAR(p->guard.wanted.force[0], -6.0, 1e-9);
+}
+
+TEST(a_force_that_the_energy_observer_takes_is_not_held_up_by_a_gap_and_comes_back_slowly)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  p->coupling.hold_known = true;
+  p->coupling.hold = 1e4; /* good for ten ticks: no less force */
+  ticks_miss(7);
+  ticks_run(1);
+  CHECK_NEAR(p->device.wrench.force[0], -5.0, 1e-9);
+  f.tick.guard.balance = -1.0;
+  p->device.pose.position[0] -= 5e-4;
+  ticks_run(1);
+  CHECK((p->guard.flags & HAP_GUARD_ENERGY) != 0);
+  CHECK_NEAR(p->device.wrench.force[0], 0.0, 1e-9);
+  f.tick.guard.balance = 1.0;
+  ticks_run(1);
+  CHECK_NEAR(p->device.wrench.force[0], -LIMIT / 12.5, 1e-9);
+  ticks_run(1);
+  CHECK_NEAR(p->device.wrench.force[0], -2.0 * LIMIT / 12.5, 1e-9);
+  f.tick.guard.balance = -1.0; /* less is held than is asked: that is no reason to hold it up */
+  p->device.pose.position[0] -= 5e-4;
+  ticks_run(1);
+  CHECK_NEAR(p->device.wrench.force[0], 0.0, 1e-9);
+  f.tick.guard.balance = 1.0;
+  ticks_run(3);
+  CHECK_NEAR(p->device.wrench.force[0], -4.0, 1e-9);
+}
+
+TEST(where_nobody_watches_what_a_gap_held_back_comes_in_unpaid)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  f.tick.guard.mode = HAP_GUARD_MEASURE;
+  ticks_run(1);
+  ticks_miss(7);
+  p->device.pose.position[0] += 4e-3;
+  ticks_run(11);
+  CHECK_NEAR(p->guard.wanted.force[0], -7.5, 1e-9); /* 0.5 mm in the gap, 10 ticks of 0.2 mm */
+  ticks_run(10);
+  CHECK_NEAR(p->guard.wanted.force[0], -9.0, 1e-9);
+}
+
+TEST(a_touch_lasts_as_long_as_its_time_and_not_as_its_ticks)
+{
+  (void)late_wall(HAP_MODEL_CONTACT);
+  double before = f.tick.guard.touch_s;
+  for (int i = 0; i < 10; ++i) {
+    ticks_miss(3);
+    ticks_run(1);
+  }
+  CHECK_NEAR(f.tick.guard.touch_s - before, 0.04, 1e-9);
 }
 
 TEST(a_contact_that_ended_in_a_gap_pushes_no_more)

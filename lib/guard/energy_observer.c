@@ -26,6 +26,12 @@
  *            spring of a contact that is no more is lost.
  *   base     the motion of a device's frame in the world, and a stiffness that is set, are the
  *            world's work: to either side.
+ *   gaps     Over missed ticks the hand goes the whole way against the force that was held: that is
+ *            booked at the port. The spring of a contact gets a part of the way, k (d - e)^2 / 2 at
+ *            a depth d of which e is held back. A change of e is no entry, so the rest of what the
+ *            hand paid stays in the ledger, and pays for e to come in: k (d^2 - (d - e)^2) / 2.
+ *            What is not paid does not come in; in a touch that lasts, slowly, as the world's work.
+ *
  *   shares   of a hull's points in its stiffness are no entry: the hand pays for their changes,
  *            which it made by tilting the hull.
  *
@@ -132,6 +138,12 @@ static double half_compliance(const hapi_pointer *p)
   return p->surface.stiffness > 0.0 ? 0.5 / p->surface.stiffness : 0.0;
 }
 
+/* 0..1, share of the force that is left by what lowers it and is no entry. */
+static double hand_gets(const hapi_pointer *p)
+{
+  return (1.0 - p->guard.late_loss) * (1.0 - p->guard.swings.taken);
+}
+
 /* J that bodies of given motion do on the pointers' springs in this tick. */
 static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *pointers,
                             const hapi_bodies *bodies, const hapi_touches *touches,
@@ -157,7 +169,7 @@ static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *p
     if (!(force2 > 0.0)) {
       continue;
     }
-    double felt = p->guard.felt * (1.0 - p->guard.late_loss) * (1.0 - p->guard.swings.taken);
+    double felt = p->guard.felt * hand_gets(p);
     *io_stored += p->rigid ? 0.0 : half_compliance(p) * force2 / c->weight;
     if (body != NULL && (body->flags & HAPI_BODY_OWNED) == 0) {
       sum -= work_on(facts->period, body, c);
@@ -209,6 +221,9 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
       double excess = r->late || p->device.jumped ? r->excess : r->felt_excess;
       double before = p->surface.stiffness - p->surface.added;
       sum += energy - spring_energy(p, c->weight * r->felt_share * before, r->depth - excess);
+      double unpaid = r->depth - r->excess - r->given;
+      sum += hand_gets(p) *
+             (energy - spring_energy(p, c->weight * share * p->surface.stiffness, unpaid));
       sum +=
           (p->guard.felt - r->felt) * rubs; /* a deep contact's friction comes in with its limit */
       sum += p->surface.stiffness > 0.0 ? r->felt * rubs * p->surface.added / p->surface.stiffness
@@ -358,6 +373,14 @@ static void pay_no_more_than(const hapi_pointers *pointers, double budget)
   }
 }
 
+void hapi_energy_pass(double period, const hapi_pointers *pointers)
+{
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    pointers->of[i].guard.paid_way = HAPI_SAFETY_CONTACT_SPEED * period;
+    pointers->of[i].guard.given_share = 0.0;
+  }
+}
+
 /* After a fault nothing is known of where the devices were. */
 static void ledger_forget(hapi_guard *guard, const hapi_pointers *pointers,
                           const hapi_touches *touches)
@@ -382,6 +405,27 @@ void hapi_energy_resume(hapi_guard *guard, const hapi_pointers *pointers, int64_
   }
 }
 
+/* The depth that gaps held back comes in as far as the hand has paid more than the springs hold:
+ * with a way w no spring gains more than its largest force times w. In a touch that lasts a share
+ * of the rest comes in, as debts are forgiven. */
+static void pointers_may_press(const hapi_guard *guard, double period,
+                               const hapi_pointers *pointers)
+{
+  bool lasts = guard->touch_s > HAPI_SAFETY_DEBT_AFTER_S;
+  double spare = hapi_max(guard->balance - guard->sprung, 0.0);
+  double force = 0.0;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
+    force += p->generation != 0 ? p->guard.limit * (double)p->contacts : 0.0;
+  }
+  double way = HAPI_SAFETY_CONTACT_SPEED * period;
+  way = spare < way * force ? spare / force : way;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    pointers->of[i].guard.paid_way = way;
+    pointers->of[i].guard.given_share = lasts ? hapi_min(period / HAPI_SAFETY_DEBT_S, 1.0) : 0.0;
+  }
+}
+
 void hapi_energy_observe(hapi_guard *guard, const hapi_tick_facts *facts,
                          const hapi_pointers *pointers, const hapi_bodies *bodies,
                          const hapi_touches *touches)
@@ -394,6 +438,7 @@ void hapi_energy_observe(hapi_guard *guard, const hapi_tick_facts *facts,
   if (!settle_ports(guard, pointers, facts->now_ns)) {
     guard->balance = hapi_min(guard->balance, 0.0);
     guard->touch_s = 0.0;
+    pointers_may_press(guard, facts->period, pointers);
     return;
   }
   double stored = couplings_store(pointers);
@@ -405,10 +450,11 @@ void hapi_energy_observe(hapi_guard *guard, const hapi_tick_facts *facts,
   /* A debt that comes all at once, after a time without the loop or when something vanished that
    * had been pressed, cannot be paid back by a hand that rests: its force would come and go for
    * ever. So in a touch that lasts, the ledger comes back to what is in the springs. */
-  guard->touch_s += facts->period;
+  guard->touch_s += facts->elapsed;
   if (guard->touch_s > HAPI_SAFETY_DEBT_AFTER_S && guard->balance < guard->sprung) {
     guard->balance +=
-        (guard->sprung - guard->balance) * hapi_min(facts->period / HAPI_SAFETY_DEBT_S, 1.0);
+        (guard->sprung - guard->balance) * hapi_min(facts->elapsed / HAPI_SAFETY_DEBT_S, 1.0);
   }
+  pointers_may_press(guard, facts->period, pointers);
   pay_no_more_than(pointers, guard->balance + overdraft);
 }

@@ -65,10 +65,10 @@ static void lateness_note(hapi_lateness *late, double period, bool force)
   late->lost_s = hapi_max(much, 0.0);
   late->gap_s *= hapi_max(1.0 - late->elapsed_s / HAPI_SAFETY_LATE_GAP_DECAY_S, 0.0);
   late->hold_s -= late->elapsed_s;
-  late->slew_s = lost > HAPI_SAFETY_LATE_GAP_S ? HAPI_SAFETY_LATE_SLEW_S
-                                               : hapi_max(late->slew_s - period, 0.0);
+  late->slew_s = hapi_max(late->slew_s - period, 0.0);
   if (lost > HAPI_SAFETY_LATE_GAP_S ||
       (lost > 0.5 * period && late->few_s > HAPI_SAFETY_LATE_FEW_S)) {
+    late->slew_s = HAPI_SAFETY_LATE_SLEW_S;
     late->gap_s = hapi_max(late->gap_s, late->elapsed_s);
     late->hold_s = HAPI_SAFETY_LATE_HOLD_S;
   }
@@ -82,6 +82,15 @@ static void pointer_derate(const hapi_lateness *late, double period, hapi_pointe
   double *now = &p->guard.late_loss;
   *now = loss > *now ? hapi_min(*now + period / HAPI_SAFETY_LATE_DOWN_S, loss)
                      : hapi_max(*now - period / HAPI_SAFETY_LATE_BACK_S, loss);
+}
+
+void hapi_lateness_tell(const hapi_guard *guard, const hapi_tick_facts *facts,
+                        hapi_coupling_late *out)
+{
+  double lost = facts->elapsed - facts->period;
+  out->elapsed = facts->elapsed;
+  out->slow = lost + guard->late.few_s > HAPI_SAFETY_LATE_GAP_S;
+  out->stood = out->slow && lost > 0.5 * facts->period ? 1.0 - facts->period / facts->elapsed : 0.0;
 }
 
 bool hapi_lateness_follow(hapi_guard *guard, const hapi_tick_facts *facts,

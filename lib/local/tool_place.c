@@ -272,6 +272,8 @@ static void follow_group(hapi_tool_world *w, uint32_t begin, hapi_local_contact 
     c->ramp.share = share;
     c->ramp.depth = tool->depth;
     c->ramp.excess = pair->ramp.excess;
+    c->ramp.late = pair->ramp.late;
+    c->ramp.given = pair->ramp.given;
     tool->depth -= pair->ramp.excess;
   }
   for (uint32_t i = pair->ring; i != begin; i = w->pairs[i].ring) {

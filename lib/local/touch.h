@@ -18,7 +18,8 @@ typedef struct hapi_ramp {
   double share;  /* 0..1, of the force */
   double excess; /* m, of the depth that does not count */
   bool held;     /* the excess goes by drawing back alone */
-  bool late;     /* the excess is of a gap between ticks: the hand pays for it */
+  bool late;     /* the excess is of a gap between ticks: the hand pays for what comes in */
+  double given;  /* m, that came in in this tick without that, as the world's work */
 
   /* Of the energy observer, at the last tick: */
   double felt_share; /* with what the guard took */

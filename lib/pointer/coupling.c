@@ -163,9 +163,8 @@ static void declared_begin(hapi_pointer *p, const hapi_pointer_handle *before, d
 }
 
 uint32_t hapi_coupling_read(const hapi_pointers *pointers, int64_t now_ns, double period,
-                            double elapsed, double physics_period)
+                            const hapi_coupling_late *late, double physics_period)
 {
-  double stood = elapsed - period > HAPI_SAFETY_LATE_GAP_S ? 1.0 - period / elapsed : 0.0;
   uint32_t unusable = 0;
   for (uint32_t i = 0; i < pointers->high; ++i) {
     hapi_pointer *p = &pointers->of[i];
@@ -173,15 +172,17 @@ uint32_t hapi_coupling_read(const hapi_pointers *pointers, int64_t now_ns, doubl
       continue;
     }
     bool good = input_is_plausible(p);
-    p->device.stood = p->device.placed ? stood : 0.0;
+    p->device.stood = p->device.placed ? late->stood : 0.0;
+    p->device.slow = late->slow;
     p->device.jumped = good && !p->frame.clutched && pointer_jumps(p, period);
     pointer_check_speed(p);
     const hapi_pointer_handle before = p->handle;
-    good = good && (p->frame.used ? pointer_place_in_frame(p, now_ns, elapsed) : pointer_place(p));
+    good = good &&
+           (p->frame.used ? pointer_place_in_frame(p, now_ns, late->elapsed) : pointer_place(p));
     p->device.jump_s =
         p->device.jumped ? HAPI_SAFETY_JUMP_S + 2.0 * physics_period : p->device.jump_s - period;
     if (p->declared.any || p->declared.was) {
-      declared_begin(p, &before, elapsed);
+      declared_begin(p, &before, late->elapsed);
     }
     if (!good) {
       unusable = unusable == 0 ? i + 1 : unusable;

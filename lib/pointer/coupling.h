@@ -9,10 +9,17 @@
 
 #include "pointer/pointer.h"
 
-/* Device -> world, of all pointers. period, elapsed and physics_period in s. Returns 1 + the index
- * of the first pointer whose pose cannot be used, which stays where it was; 0: all can. */
+/* How late a tick comes. */
+typedef struct hapi_coupling_late {
+  double elapsed; /* s, since the tick before */
+  double stood;   /* as of hapi_pointer_device */
+  bool slow;
+} hapi_coupling_late;
+
+/* Device -> world, of all pointers. period and physics_period in s. Returns 1 + the index of the
+ * first pointer whose pose cannot be used, which stays where it was; 0: all can. */
 uint32_t hapi_coupling_read(const hapi_pointers *pointers, int64_t now_ns, double period,
-                            double elapsed, double physics_period);
+                            const hapi_coupling_late *late, double physics_period);
 
 /* World wrench -> device wrench. */
 void hapi_coupling_write(hapi_pointer *pointer);

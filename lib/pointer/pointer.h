@@ -53,6 +53,7 @@ typedef struct hapi_pointer_device {
   uint32_t buttons;   /* in */
   double jump_s;      /* s, > 0: contacts that arrive deep are so because of a jump */
   double stood;       /* 0..1, share of the time since the last read in which ticks were missed */
+  bool slow;          /* so many were missed of late that bodies are in slow motion */
   double speed_limit; /* m/s, that a hand can make; 0: none */
   double motion_scale;
   double force_scale;
@@ -222,6 +223,9 @@ typedef struct hapi_guard_pointer {
   double felt;        /* 0..1, share after ramp-in and age */
   double force2;      /* N^2, of this tick: sum over the contacts, other models than CONTACT */
   double power;       /* W, likewise: of the bodies on the springs */
+  /* Of the depth that gaps held back, what comes in in the next tick: */
+  double paid_way;    /* m, that the hand has paid for */
+  double given_share; /* 0..1, of the rest: the world's work */
   hapi_swings swings;
 } hapi_guard_pointer;
 

@@ -8,6 +8,7 @@
 #include "base/vec.h"
 #include "guard/energy_observer.h"
 #include "guard/force_guard.h"
+#include "guard/lateness.h"
 #include "guard/oscillation.h"
 #include "paper/local_dynamics.h"
 #include "paper/render.h"
@@ -115,8 +116,10 @@ void hapi_tick_read(hapi_tick *tick, int64_t now_ns)
   double since = facts->tick > 0 ? 1e-9 * (double)(now_ns - facts->read_ns) : 0.0;
   facts->elapsed = hapi_max(since, facts->period);
   facts->now_ns = facts->read_ns = now_ns;
-  uint32_t unusable = hapi_coupling_read(&tick->pointers, now_ns, facts->period, facts->elapsed,
-                                         facts->physics_period);
+  hapi_coupling_late late;
+  hapi_lateness_tell(&tick->guard, facts, &late);
+  uint32_t unusable =
+      hapi_coupling_read(&tick->pointers, now_ns, facts->period, &late, facts->physics_period);
   if (unusable > 0) {
     hapi_tick_fault(tick, HAP_FAULT_DEVICE_POSE, unusable);
   }
@@ -148,6 +151,8 @@ void hapi_tick_guard(hapi_tick *tick)
     uint64_t begin = hapi_effect_begin(&tick->sample);
     hapi_energy_observe(&tick->guard, &tick->facts, &tick->pointers, &tick->bodies, &tick->touches);
     hapi_effect_end(&tick->sample, HAP_EFFECT_OBSERVER, begin);
+  } else {
+    hapi_energy_pass(tick->facts.period, &tick->pointers);
   }
   hapi_guard_write(&tick->guard, tick->facts.period, &tick->pointers);
 }
