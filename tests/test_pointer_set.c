@@ -434,6 +434,38 @@ TEST(what_a_base_presses_in_the_hand_gets_back)
   CHECK(hand_state(d).wrench.force[2] == 0.0);
 }
 
+/* The base goes down by z, as the hand of the device would if the device swung or ran away. */
+static void base_drive(desk *d, double z, double speed)
+{
+  hap_pointer_settings s = settings_of(HAP_SET_BASE);
+  s.pose_world_device.position[2] = -z;
+  s.twist_world_device.linear[2] = -speed;
+  hand_set(d, &s);
+  desk_wait(d, 1);
+  CHECK((hand_state(d).guard & HAP_GUARD_OSCILLATION) == 0);
+}
+
+TEST(a_base_that_shakes_is_no_device_that_swings)
+{
+  const double omega = 2.0 * M_PI * 15.0;
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  for (int i = 0; i < 2000; ++i) {
+    base_drive(d, 0.004 + 0.004 * sin(omega * T * i), 0.004 * omega * cos(omega * T * i));
+  }
+}
+
+TEST(a_base_that_accelerates_is_no_device_that_runs_away)
+{
+  const double growth = 45.0; /* 1/s: v^2 / work as of a mass of less than a kg */
+  desk *d = floor_desk(HAP_MODEL_CONTACT);
+  desk_move(d, 0.0, 0.0, DEPTH, 200);
+  desk_wait(d, SETTLE);
+  for (int i = 0; i < 120; ++i) {
+    double z = 1e-4 * exp(growth * T * i);
+    base_drive(d, z, growth * z);
+  }
+}
+
 TEST(a_base_that_is_elsewhere_is_reached_in_20_ms)
 {
   desk *d = floor_desk(HAP_MODEL_CONTACT);
@@ -551,6 +583,100 @@ TEST(a_workspace_is_fitted_to_a_box)
                                   AT(0.8, NAN, 0.2)) == HAP_ERROR_ARGUMENT);
   CHECK(hap_pointer_fit_workspace(d->session, d->hand, NULL, AT(0.1, 0.05, 0.1), &box,
                                   AT(0.8, 0.2, 0.2)) == HAP_ERROR_ARGUMENT);
+}
+
+/* ---- whatever is set ---- */
+
+typedef struct storm_row {
+  const char *name;
+  hap_model model;
+  bool sharp;
+} storm_row;
+
+static const storm_row storms[] = {
+    {"a_storm_of_settings_is_bounded_in_model_single", HAP_MODEL_SINGLE, false},
+    {"a_storm_of_settings_is_bounded_in_model_impulse", HAP_MODEL_IMPULSE, false},
+    {"a_storm_of_settings_is_bounded_in_model_accelerance", HAP_MODEL_ACCELERANCE, false},
+    {"a_storm_of_settings_is_bounded_in_model_contact", HAP_MODEL_CONTACT, false},
+    {"a_storm_of_settings_of_a_tool_is_bounded_in_model_single", HAP_MODEL_SINGLE, true},
+    {"a_storm_of_settings_of_a_tool_is_bounded_in_model_contact", HAP_MODEL_CONTACT, true},
+};
+
+/* 0..1, the same in every run. */
+static double storm_number(uint64_t *io)
+{
+  *io = *io * 6364136223846793005u + 1442695040888963407u;
+  return (double)(*io >> 11) / 9007199254740992.0;
+}
+
+static void storm_set(desk *d, const storm_row *row, uint64_t *io)
+{
+  const hap_coupling kinds[] = {HAP_COUPLING_DIRECT, HAP_COUPLING_PROXY, HAP_COUPLING_AUTO,
+                                HAP_COUPLING_GOD_OBJECT, HAP_COUPLING_VIRTUAL};
+  hap_pointer_settings s = settings_of((uint32_t)(storm_number(io) * 4096.0));
+  s.mask &= (uint32_t)(storm_number(io) * 4096.0); /* a quarter of the bits */
+  s.mask &= ~(uint32_t)((s.mask & (HAP_SET_BASE | HAP_SET_UNCLUTCHED)) == 0 ? HAP_SET_TELEPORT : 0);
+  for (int i = 0; i < 3; ++i) {
+    s.pose_world_device.position[i] = 0.03 * (storm_number(io) - 0.5);
+    s.twist_world_device.linear[i] = storm_number(io) - 0.5;
+    s.twist_world_device.angular[i] = storm_number(io) - 0.5;
+  }
+  double half = storm_number(io) - 0.5;
+  s.pose_world_device.quat_wxyz[0] = cos(half);
+  s.pose_world_device.quat_wxyz[2] = sin(half);
+  s.motion_scale = 0.3 + 2.0 * storm_number(io);
+  s.stiffness = 3000.0 * storm_number(io);
+  s.damping = 5.0 * storm_number(io);
+  s.friction = storm_number(io);
+  s.finger_radius = storm_number(io) < 0.5 ? 0.0 : 0.005;
+  s.max_force = 2.0 + 18.0 * storm_number(io);
+  s.radius = 0.002 + 0.015 * storm_number(io);
+  if (row->sharp && storm_number(io) < 0.7) {
+    s.hull_xyz = &wedge[0][0];
+    s.hull_points = 4;
+  }
+  s.collide_bits = storm_number(io) < 0.2 ? 0u : ~0u;
+  s.coupling =
+      row->model == HAP_MODEL_CONTACT ? kinds[(int)(storm_number(io) * 5.0)] : HAP_COUPLING_AUTO;
+  s.coupling_stiffness = 200.0 + 2000.0 * storm_number(io);
+  hand_set(d, &s);
+  if (storm_number(io) < 0.1) {
+    REQUIRE(hap_pointer_clutch(d->session, d->hand, storm_number(io) < 0.4) == HAP_OK);
+  }
+}
+
+TEST_EACH(storms, const storm_row *row)
+{
+  uint64_t number = 7;
+  double steepest = 0.0;
+  double most = 0.0;
+  int pushing = 0;
+  desk *d = desk_new(10.0, row->model);
+  d->hand_def.max_force = LIMIT;
+  floor_add(d);
+  for (int i = 0; i < 3; ++i) {
+    ode_box(d->world, d->space, 0.1, AT(0.04, 0.04, 0.04), AT(0.06 * i - 0.06, 0.02, 0.02));
+  }
+  desk_run(d, 0.0, 0.0, 0.06);
+  hap_pointer_state before = hand_state(d);
+  for (int i = 0; i < 6000; ++i) {
+    if (storm_number(&number) < 0.03) {
+      storm_set(d, row, &number);
+    }
+    double t = T * i;
+    desk_move(d, 0.06 * sin(2.0 * t) - d->at[0], 0.02 * sin(3.1 * t) - d->at[1],
+              0.03 + 0.03 * cos(5.0 * t) - d->at[2], 1);
+    hap_pointer_state now = hand_state(d);
+    steepest = fmax(steepest, vector_far(now.wrench.force, before.wrench.force));
+    most = fmax(most, vector_far(now.wrench.force, AT(0.0, 0.0, 0.0)));
+    pushing += vector_far(now.wrench.force, AT(0.0, 0.0, 0.0)) > 0.1;
+    before = now;
+  }
+  CHECK(isfinite(most) && most <= LIMIT * (1.0 + 1e-9));
+  CHECK(steepest <= LIMIT * T / 0.002 * (1.0 + 1e-9));
+  CHECK(pushing > 200);
+  CHECK(session_stats(d->session).faults.fault == HAP_FAULT_NONE);
+  tap_say("most %.1f N, steepest %.2f N a tick, force in %d ticks", most, steepest, pushing);
 }
 
 /* ---- devices ---- */
