@@ -47,7 +47,6 @@ static const double contact_rates[] = {20.0, 100.0, 200.0, 1000.0, 50.0, 500.0};
 static const double iterations[] = {5.0, 100.0, 10.0, 20.0, 50.0, 200.0, 500.0};
 static const double sweeps[] = {2.0, 4.0, 3.0, 6.0, 10.0, 20.0};
 static const double hops[] = {0.0, 2.0, 1.0, 4.0, 8.0};
-static const double edge_probes[] = {0.0, 16.0, 64.0};
 static const double reuses[] = {0.0, 1e-7, 1e-6, 1e-5, 1e-4};
 static const double haptic_rates[] = {500.0, 2000.0, 5000.0, 10000.0};
 
@@ -180,7 +179,6 @@ static const struct {
     {"iterations", KNOB(iterations), true, VALUES(iterations, 2), BENCH_COUNT(models)},
     {"sweeps", KNOB(expert.max_sweeps), true, VALUES(sweeps, 2), 1},
     {"range_hops", KNOB(expert.range_hops), true, VALUES(hops, 2), 1},
-    {"edge_probes", KNOB(expert.max_edge_probes), true, VALUES(edge_probes, 0), 1},
     {"reuse", KNOB(expert.reuse), false, VALUES(reuses, 0), 2},
     {"haptic_hz", KNOB(session.haptic_hz), false, VALUES(haptic_rates, 2), BENCH_COUNT(models)},
 };

@@ -545,7 +545,7 @@ static const char *const knobs[] = {
     "--friction 0.6 --finger-radius 0.01 --physics-hz 20",
     "--friction 0.6 --model accelerance",
     "--haptic-hz 2000 --contact-hz 100",
-    "--range 1 --edge-probes 8",
+    "--range 1",
     "--sweeps 4 --iterations 5",
     "--model accelerance --reuse 0.001",
     "--model accelerance --lookback 0.2 --physics-hz 30",

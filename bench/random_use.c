@@ -1402,7 +1402,6 @@ static hap_status session_create(use *u, hap_detail *detail)
   def.physics_hz = rates[dice_below(u, 5)];
   def.max_pointers = POINTERS;
   def.max_bodies = dice_chance(u, 0.2) ? 3 : def.max_bodies;
-  expert.max_edge_probes = dice_chance(u, 0.2) ? 8 : expert.max_edge_probes;
   expert.range_hops = dice_chance(u, 0.2) ? dice_below(u, 3) : expert.range_hops;
   expert.lookback = dice_chance(u, 0.25) ? 0.2 : 0.0;
   def.accuracy = dice_chance(u, 0.3) ? dice_between(u, 0.0, 1.0) : def.accuracy;

@@ -129,7 +129,6 @@ TEST(what_does_not_fit_is_left_out_from_the_far_end)
   w->surface.mu = 0.0;
   w->def.physics_hz = 100.0;
   w->def.max_bodies = 3;
-  w->expert.max_edge_probes = 0;
   for (int i = 0; i < 8; ++i) {
     cw_add_cube(w, 1.0, 0.05, 0.05 * (7 - i), 0.0, 0.0); /* the far one first */
   }
@@ -575,14 +574,13 @@ static void forget_asked(void *user, double step_s)
   cw_before_step(user, step_s);
 }
 
-static void ask_in_pile(int range, int probes)
+static void ask_in_pile(int range)
 {
   contact_world *w = cw_new(G);
   memset(&asking, 0, sizeof asking);
   w->ode.surface = surface_ask;
   w->ode.before_step = forget_asked;
   w->def.max_bodies = range;
-  w->expert.max_edge_probes = probes;
   cw_add_floor(w);
   for (int i = 0; i < 8; ++i) {
     cw_add_cube(w, 1.0, 0.05, 0.05 * i, 0.0, 0.0249);
@@ -597,8 +595,8 @@ static void ask_in_pile(int range, int probes)
 
 TEST(the_surface_of_a_pair_is_asked_once_a_step)
 {
-  ask_in_pile(64, 4);
-  ask_in_pile(3, 4);
+  ask_in_pile(64);
+  ask_in_pile(3);
 }
 
 /* ---- other models on the way ---- */

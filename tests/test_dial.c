@@ -18,7 +18,6 @@ static const hapi_knobs by_accuracy = {.contact_hz = HAP_BY_ACCURACY,
                                        .probe = HAP_PROBE_BY_ACCURACY,
                                        .max_sweeps = HAP_BY_ACCURACY,
                                        .range_hops = HAP_BY_ACCURACY,
-                                       .edge_probes = HAP_BY_ACCURACY,
                                        .iterations = HAP_BY_ACCURACY,
                                        .reuse = HAP_BY_ACCURACY};
 
@@ -35,7 +34,6 @@ static void check_more(const hapi_settings *a, const hapi_settings *b)
   CHECK(a->max_sweeps == 0 && b->max_sweeps == 0);
   CHECK(value_is_endless(a->range_hops) <= value_is_endless(b->range_hops));
   CHECK(a->row_updates <= b->row_updates);
-  CHECK(a->edge_probes <= b->edge_probes);
   CHECK(a->iterations <= b->iterations);
   CHECK(a->shapes <= b->shapes);
   CHECK(a->reuse >= b->reuse);
@@ -58,7 +56,7 @@ TEST(the_default_is_what_the_library_is_without)
   hapi_settings s;
   hapi_dial_settings(&by_accuracy, HAPI_DIAL_DEFAULT, HAPI_DIAL_DEFAULT, 1e-3, &s);
   CHECK(s.contact_hz == 200.0 && s.probe == HAP_PROBE_SHARED && s.max_sweeps == 0);
-  CHECK(s.range_hops == HAP_RANGE_ALL && s.edge_probes == 4 && s.iterations == 1.0 && s.shapes);
+  CHECK(s.range_hops == HAP_RANGE_ALL && s.iterations == 1.0 && s.shapes);
   CHECK(s.reuse == 1e-7);
   CHECK(hapi_dial_percent(HAP_ACCURACY_DEFAULT) == HAPI_DIAL_DEFAULT);
 }
@@ -73,9 +71,9 @@ TEST(a_side_has_its_own_settings)
   hapi_dial_settings(&by_accuracy, 50, 0, 1e-3, &physics);
   CHECK(middle.shapes && !tick.shapes && tick.range_hops == 1);
   CHECK(10 * tick.row_updates < middle.row_updates);
-  CHECK(tick.iterations == middle.iterations && tick.edge_probes == middle.edge_probes);
+  CHECK(tick.iterations == middle.iterations && tick.reuse == middle.reuse);
   CHECK(physics.max_sweeps == 0 && physics.shapes && physics.range_hops == HAP_RANGE_ALL);
-  CHECK(physics.iterations < middle.iterations && physics.edge_probes < middle.edge_probes);
+  CHECK(physics.iterations < middle.iterations && physics.reuse > middle.reuse);
 }
 
 TEST(what_was_given_stays)
@@ -84,7 +82,6 @@ TEST(what_was_given_stays)
                             .probe = HAP_PROBE_PAPER,
                             .max_sweeps = 0,
                             .range_hops = 3,
-                            .edge_probes = 0,
                             .iterations = 33,
                             .reuse = 1e-3};
   const hapi_knobs worlds = {.iterations = 0};
@@ -92,7 +89,7 @@ TEST(what_was_given_stays)
   for (int percent = 0; percent <= 100; percent += 50) {
     hapi_dial_settings(&given, percent, percent, 1e-3, &s);
     CHECK(s.contact_hz == 77.0 && s.probe == HAP_PROBE_PAPER && s.max_sweeps == 0);
-    CHECK(s.range_hops == 3 && s.edge_probes == 0 && s.fixed_iterations == 33);
+    CHECK(s.range_hops == 3 && s.fixed_iterations == 33);
     CHECK(s.reuse == 1e-3);
     hapi_dial_settings(&worlds, percent, percent, 1e-3, &s);
     CHECK(s.iterations == 1.0 && s.fixed_iterations == 0 && s.range_hops == 0);
@@ -243,7 +240,7 @@ TEST(the_session_tells_where_it_stands)
   CHECK(info.accuracy == 0.1 && info.tick.accuracy == 0.1 && info.physics.accuracy == 0.1);
   CHECK(info.tick.reason == HAP_ACCURACY_ASKED && info.physics.reason == HAP_ACCURACY_ASKED);
   CHECK(info.max_sweeps == 7 && info.range_hops == 4 && info.shapes == 1);
-  CHECK(info.contact_hz == 50.0 && info.edge_probes == 1 && info.iterations == 50);
+  CHECK(info.contact_hz == 50.0 && info.iterations == 50);
   CHECK(info.probe == HAP_PROBE_SHARED && info.row_updates == 300);
   CHECK(info.tick.share == 0.0 && info.tick.load == 0.0 && info.tick.turns == 0);
 }
@@ -491,7 +488,7 @@ TEST(a_budget_turns_physics_back)
   w->expert.physics_share = 0.01;
   hap_accuracy_info info = run_threads(w, physics_at_least);
   CHECK(physics_at_least(&info) && info.physics.accuracy == 0.0);
-  CHECK(info.iterations == 50 && info.edge_probes == 0);
+  CHECK(info.iterations == 50);
   CHECK(info.tick.accuracy == 0.5);
 }
 

@@ -10,6 +10,7 @@
 #include <tests/tap.h>
 
 #include <tests/contact_world.h>
+#include <tests/unknown_shape.h>
 
 #include "physics/physics_internal.h"
 #include "session/session_internal.h"
@@ -469,20 +470,25 @@ TEST(joints_are_held_against_what_they_were)
 
 /* ---- model CONTACT ---- */
 
-/* A row on a floor, held against a wall: the range ends after the first cube. */
+/* A row on a floor, held against a wall by two hands on a cube that is measured as a whole. */
 static contact_world *begin_row(double reuse)
 {
   contact_world *w = cw_new(CW_GRAVITY);
   dWorldSetContactSurfaceLayer(w->world, LAYER);
   w->def.physics_hz = 50.0;
   w->expert.reuse = reuse;
-  w->expert.range_hops = 0;
   (void)cw_add_floor(w);
   (void)dCreatePlane(w->space, -1.0, 0.0, 0.0, -(3.5 * EDGE - 4.0 * OVERLAP));
   for (int i = 0; i < 4; ++i) {
     (void)cw_add_cube(w, 0.5, EDGE, (EDGE - OVERLAP) * i, 0.0, 0.5 * EDGE - OVERLAP);
   }
-  cw_start(w, -0.5 * EDGE - w->hand_def.radius, 0.0, 0.5 * EDGE);
+  add_unknown_shape(w->space, w->bodies[0]);
+  cw_start(w, -0.5 * EDGE - w->hand_def.radius, 0.01, 0.5 * EDGE);
+  hap_pointer_id other;
+  const hap_pose pose = {{-0.5 * EDGE - w->hand_def.radius + 1e-3, -0.01, 0.5 * EDGE},
+                         {1.0, 0.0, 0.0, 0.0}};
+  REQUIRE(hap_pointer_add(w->session, &w->hand_def, &other) == HAP_OK);
+  REQUIRE(hap_pointer_set_target(w->session, other, &pose, NULL) == HAP_OK);
   cw_go(w, 0.04, 0.0, 0.0, 100);
   cw_go(w, 0.0, 0.0, 0.0, SETTLE_STEPS * STEP_TICKS);
   return w;
@@ -500,7 +506,7 @@ static int count_roles(const contact_world *w, uint32_t flag)
   return count;
 }
 
-TEST(the_border_of_the_range_rests)
+TEST(a_measured_body_that_rests_is_measured_once)
 {
   contact_world *w = begin_row(1e-6);
   contact_world *reference = begin_row(0.0);

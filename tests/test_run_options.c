@@ -76,13 +76,11 @@ TEST(single_settings_stay_when_they_are_given)
   const hap_expert_def *expert = &options.rig.expert;
   CHECK(options_parse("--seconds 1") == HAP_OK && expert->iterations == HAP_BY_ACCURACY);
   CHECK(expert->max_sweeps == HAP_BY_ACCURACY && expert->range_hops == HAP_BY_ACCURACY);
-  CHECK(expert->max_edge_probes == HAP_BY_ACCURACY);
-  CHECK(options_parse("--iterations 500 --sweeps 4 --range 0 --edge-probes 7") == HAP_OK);
+  CHECK(options_parse("--iterations 500 --sweeps 4 --range 0") == HAP_OK);
   CHECK(expert->iterations == 500 && expert->max_sweeps == 4);
-  CHECK(expert->range_hops == 0 && expert->max_edge_probes == 7);
-  CHECK(options_parse("--iterations world --range all --edge-probes 0") == HAP_OK);
-  CHECK(expert->iterations == 0 && expert->range_hops == HAP_RANGE_ALL &&
-        expert->max_edge_probes == 0);
+  CHECK(expert->range_hops == 0);
+  CHECK(options_parse("--iterations world --range all") == HAP_OK);
+  CHECK(expert->iterations == 0 && expert->range_hops == HAP_RANGE_ALL);
   CHECK(options_refused("--iterations 0", "--iterations", "1 to 10000"));
   CHECK(options_refused("--iterations worlds", "--iterations", "1 to 10000"));
   CHECK(options_parse("--substeps 4") == HAP_OK && expert->substeps == 4);
@@ -91,8 +89,8 @@ TEST(single_settings_stay_when_they_are_given)
   CHECK(options_refused("--sweeps 2.5", "--sweeps", "whole number"));
   CHECK(options_refused("--range -1", "--range", "0 to 1024"));
   CHECK(options_refused("--range nan", "--range", "0 to 1024"));
-  CHECK(options_refused("--edge-probes 1e3x", "--edge-probes", "0 to 1024"));
-  CHECK(options_refused("--edge-probes 1025", "--edge-probes", "0 to 1024"));
+  CHECK(options_refused("--range 1e3x", "--range", "0 to 1024"));
+  CHECK(options_refused("--range 1025", "--range", "0 to 1024"));
 }
 
 /* Each line of the help begins an option, or goes on below its text. */
@@ -125,7 +123,6 @@ TEST(the_summary_says_what_accuracy_comes_to)
                             .max_sweeps = 2,
                             .range_hops = 4,
                             .probe = HAP_PROBE_OPERATING,
-                            .edge_probes = 3,
                             .iterations = 20,
                             .reuse = 1e-6,
                             .row_updates = 300};
@@ -140,6 +137,6 @@ TEST(the_summary_says_what_accuracy_comes_to)
                "load_tick: 0.3 of 0.2, turned 4 times\n"
                "accuracy_physics: 0.6 (as much as fits)\n"
                "accuracy_settings: contact_hz=100,max_sweeps=2,range_hops=4,shapes=0,"
-               "probe=operating,max_edge_probes=3,iterations=20,reuse=1e-06,"
+               "probe=operating,iterations=20,reuse=1e-06,"
                "row_updates=300\n") == 0);
 }

@@ -275,10 +275,6 @@ static const option table[] = {
      "model contact: bodies of the loop, so many contacts from the neighbours, 0 to\n"
      "1024, or all that hang together (default: all, from --accuracy 0.2 on)",
      take_range, offsetof(run_options, rig.expert.range_hops), 0, 1024},
-    {"--edge-probes", "N",
-     "model contact: bodies at the border of that range that are probed in a step of\n"
-     "physics, 0 to 1024 (default: as --accuracy says, 4 at 0.5)",
-     take_count, offsetof(run_options, rig.expert.max_edge_probes), 0, 1024},
     {"--seconds", "S", "length of the run (default: the scene's)", take_number,
      offsetof(run_options, seconds), 0.001, 86400},
     {"--lockstep", NULL, "virtual clock, as fast as it goes, reproducible", take_constant,

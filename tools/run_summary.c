@@ -146,8 +146,8 @@ static void print_settings(const hap_accuracy_info *info, FILE *out)
       info->probe < sizeof probes / sizeof probes[0] ? probes[info->probe] : "unknown";
   fprintf(out, "accuracy_settings: contact_hz=%g,max_sweeps=%d,range_hops=%d,shapes=%u,probe=%s,",
           info->contact_hz, info->max_sweeps, info->range_hops, info->shapes, probe);
-  fprintf(out, "max_edge_probes=%d,iterations=%d,reuse=%g,row_updates=%u\n", info->edge_probes,
-          info->iterations, info->reuse, info->row_updates);
+  fprintf(out, "iterations=%d,reuse=%g,row_updates=%u\n", info->iterations, info->reuse,
+          info->row_updates);
 }
 
 void run_summary_accuracy(const hap_accuracy_info *info, FILE *out)

@@ -39,11 +39,10 @@ typedef struct hap_expert_def {
   int32_t max_sweeps;
   /* model CONTACT, 0..1024 [HAP_RANGE_ALL]: how far the range goes from the neighbours, counted
    * in contacts. 0: the neighbours alone; 1: also the bodies that may touch them. Jointed bodies
-   * count as one. Bodies beyond answer as max_edge_probes says */
+   * count as one. Bodies beyond answer with their mass, and are held by as much of the last push as
+   * the world took up */
   int32_t range_hops;
-  /* model CONTACT, 0..1024 [4]: bodies at the border of the range that are probed at a physics
-   * step, by 7 steps of their island of at most 64 bodies. The others answer with their own mass
-   * alone until the next step */
+  /* 0..1024, without effect: bodies at the border of the range take no testing simulations */
   int32_t max_edge_probes;
   /* of QuickStep in all steps of physics, 1..10000 [the world's]. 0: the world's. At another
    * accuracy in proportion */

@@ -42,7 +42,6 @@ static const tick_row tick_rows[] = {
 typedef struct physics_row {
   int from;
   hap_probe probe;
-  uint32_t edge_probes;
   double iterations; /* times those of the world */
   double reuse;      /* m */
 } physics_row;
@@ -50,12 +49,11 @@ typedef struct physics_row {
 /* Iterations last: a world that is solved too badly pushes on the loop with forces that are not
  * there. */
 static const physics_row physics_rows[] = {
-    {0, HAP_PROBE_SHARED, 0, 0.5, 1e-4},      {10, HAP_PROBE_SHARED, 1, 0.5, 1e-4},
-    {20, HAP_PROBE_SHARED, 1, 0.75, 1e-5},    {30, HAP_PROBE_SHARED, 2, 1.0, 1e-5},
-    {40, HAP_PROBE_SHARED, 4, 1.0, 1e-6},     {50, HAP_PROBE_SHARED, 4, 1.0, 1e-7},
-    {60, HAP_PROBE_OPERATING, 4, 1.0, 1e-7},  {70, HAP_PROBE_OPERATING, 8, 1.0, 1e-7},
-    {80, HAP_PROBE_OPERATING, 16, 2.0, 1e-7}, {90, HAP_PROBE_OPERATING, 32, 2.0, 0.0},
-    {100, HAP_PROBE_OPERATING, 64, 4.0, 0.0},
+    {0, HAP_PROBE_SHARED, 0.5, 1e-4},     {20, HAP_PROBE_SHARED, 0.75, 1e-5},
+    {30, HAP_PROBE_SHARED, 1.0, 1e-5},    {40, HAP_PROBE_SHARED, 1.0, 1e-6},
+    {50, HAP_PROBE_SHARED, 1.0, 1e-7},    {60, HAP_PROBE_OPERATING, 1.0, 1e-7},
+    {80, HAP_PROBE_OPERATING, 2.0, 1e-7}, {90, HAP_PROBE_OPERATING, 2.0, 0.0},
+    {100, HAP_PROBE_OPERATING, 4.0, 0.0},
 };
 
 /* A row update takes about this on a slow processor. No solve may run past its tick on account
@@ -94,7 +92,6 @@ void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_p
   out->range_hops = knobs->range_hops != HAP_BY_ACCURACY ? knobs->range_hops : tick->range_hops;
   out->shapes = tick->shapes;
   out->probe = knobs->probe != HAP_PROBE_BY_ACCURACY ? knobs->probe : physics->probe;
-  out->edge_probes = knobs->edge_probes >= 0 ? (uint32_t)knobs->edge_probes : physics->edge_probes;
   out->iterations = by_accuracy ? physics->iterations : knobs->iterations == 0 ? 1.0 : 0.0;
   out->reuse = knobs->reuse >= 0.0 ? knobs->reuse : physics->reuse;
   out->fixed_iterations = knobs->iterations > 0 ? knobs->iterations : 0;
@@ -285,7 +282,7 @@ void hapi_dial_tell(const hapi_dial *dial, const hapi_settings *s, hap_accuracy_
   out->contact_hz = s->contact_hz;
   out->max_sweeps = (int32_t)s->max_sweeps;
   out->range_hops = s->range_hops;
-  out->edge_probes = (int32_t)s->edge_probes;
+  out->edge_probes = 0;
   out->shapes = s->shapes;
   out->row_updates = s->row_updates;
   out->reuse = s->reuse;

@@ -25,7 +25,7 @@ bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
   }
   rows->capacity = ROWS_PER_CONTACT * c->contacts +
                    ROWS_PER_POINTER_CONTACT * (c->contacts + 2 * c->tool_points) + 2 * c->pointers +
-                   HAPI_JOINT_ROWS * c->joints;
+                   HAPI_JOINT_ROWS * c->joints + c->bodies;
   rows->solver.tolerance = SOLVER_TOLERANCE;
   rows->solver.update_budget = SOLVER_UPDATES;
   rows->solver.direct_rows = DIRECT_ROWS;

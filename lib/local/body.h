@@ -85,6 +85,7 @@ typedef struct hapi_bodies {
   hapi_body_course *courses; /* likewise */
   uint32_t *live;            /* slots in the model, live_count */
   uint32_t live_count;
+  uint32_t braced;         /* of the model */
   uint32_t high;           /* beyond the highest slot that was ever used */
   uint32_t resting;        /* at the tick's begin */
   bool unsound;            /* a state was not finite in this tick */

@@ -220,6 +220,7 @@ void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, int64_t now
 {
   const hapi_model_body *in = hapi_model_bodies(model);
   bodies_leave(bodies, model, before);
+  bodies->braced = 0;
   bodies_change_time(bodies, model, before);
   for (uint32_t i = 0; i < model->body_count; ++i) {
     HAPI_ASSERT_UNIT_QUAT(in[i].pose.quat_wxyz);
@@ -239,6 +240,7 @@ void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, int64_t now
       hapi_course_adopt(course, model, &in[i], from, now_ns, body);
     }
     bodies->live[i] = in[i].slot;
+    bodies->braced += (in[i].flags & HAPI_BODY_BRACED) != 0;
     if (in[i].slot >= bodies->high) {
       bodies->high = in[i].slot + 1;
     }

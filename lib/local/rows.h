@@ -18,8 +18,8 @@ typedef struct hapi_row_source {
   uint32_t contact; /* of the patches, or of the pointers */
   uint32_t body_a;  /* slot; HAPI_SLOT_NONE: none */
   uint32_t body_b;
-  uint8_t part; /* 0 normal, 1 and 2 friction; of a joint: see joint_rows.c */
-  bool pointer;
+  uint8_t part;    /* 0 normal, 1 and 2 friction; of a joint: see joint_rows.c */
+  bool pointer;    /* also of a brace, which has neither a contact nor bodies here */
   bool joint;      /* contact is the index of a joint */
   bool pushes_out; /* its target lifts a body out of another one, or closes a joint: not to stay in
                       the velocity */

@@ -8,6 +8,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/vec.h"
+#include "physics/brace.h"
 #include "physics/physics_internal.h"
 
 /* One cycle of the physics thread, in the paper's order: step, neighbours, testing simulations,
@@ -334,6 +335,7 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
     hapi_lookback_open(&physics->lookback, now_ns);
   }
   hapi_reconcile_push(&physics->account);
+  hapi_brace_begin(&physics->account);
   bool in_parts = physics->cycle.model == HAP_MODEL_CONTACT && physics->cycle.step_s > 0.0;
   physics->cycle.parts = in_parts ? physics->config.substeps : 1;
   seconds[4] += stopwatch_lap(&watch);
@@ -343,6 +345,7 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[1] = stopwatch_lap(&watch);
   global_step(physics);
   seconds[3] = stopwatch_lap(&watch);
+  hapi_brace_find(&physics->account);
   hapi_reconcile_residual(&physics->account);
   hapi_reconcile_overwrite(&physics->account);
   hapi_neighbors_find(&physics->near);

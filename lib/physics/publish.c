@@ -37,6 +37,16 @@ static double keep_per_tick(const hapi_cycle *cycle, double damping)
   return pow(1.0 - share, hapi_tick_ratio(cycle));
 }
 
+static void fill_brace(const hapi_slot_account *of, hapi_model_body *out)
+{
+  const uint32_t others = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
+  bool any = hapi_v3_norm(of->brace) > 0.0 || hapi_v3_norm(of->brace + 3) > 0.0;
+  if (any && (out->flags & others) == 0) {
+    out->flags |= HAPI_BODY_BRACED;
+    memcpy(out->brace, of->brace, sizeof out->brace);
+  }
+}
+
 /* What the loop needs to move the body itself. */
 static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
                           const hapi_body_answer *answer, hapi_slot_account *of,
@@ -77,6 +87,7 @@ static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
   out->max_angular_speed = dBodyGetMaxAngularSpeed(body);
   memcpy(out->gain_taken, slot->gain_taken, sizeof out->gain_taken);
   memcpy(out->response, answer->response, sizeof out->response);
+  fill_brace(of, out);
 }
 
 static void vector_scale(double scale, double *io, int count)
@@ -109,7 +120,8 @@ static void body_scale(double scale, hapi_model_body *io)
     vector_scale(slow2, io->inverse_inertia, 9);
   } else {
     const uint32_t roles = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_RESTING |
-                           HAPI_BODY_WHOLE | HAPI_BODY_ALONE | HAPI_BODY_GYROSCOPIC;
+                           HAPI_BODY_WHOLE | HAPI_BODY_ALONE | HAPI_BODY_GYROSCOPIC |
+                           HAPI_BODY_BRACED;
     io->flags = (io->flags & ~roles) | HAPI_BODY_DRIVEN;
   }
 }

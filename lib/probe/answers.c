@@ -39,7 +39,6 @@ void hapi_answers_follow(hapi_answers *answers, const hapi_slots *slots)
       answers->bodies[i] = (hapi_body_answer){.generation = slot->generation};
     }
     answers->bodies[i].flags = slot->flags;
-    answers->bodies[i].edge = false;
   }
   for (uint32_t i = 0; i < slots->contact_high; ++i) {
     if (answers->contacts[i].generation != slots->contacts[i].generation) {

@@ -12,14 +12,11 @@
 #include "sync/exchange.h"
 
 typedef struct hapi_body_answer {
-  uint32_t generation;  /* of the slot that the rest is of */
-  uint32_t flags;       /* HAPI_BODY_*: the slot's, and what was found out in this cycle */
-  bool edge;            /* in this cycle: measured only because it borders the range */
-  bool spared;          /* in this cycle: an edge that keeps its response, for want of room */
-  bool b_is_good;       /* of the newest testing simulations */
-  bool known_free;      /* model ACCELERANCE: nothing holds it, so nothing was measured */
-  bool measured;        /* model CONTACT: response and b hold a measurement */
-  uint64_t measured_in; /* model CONTACT: number of the model before which it was measured last */
+  uint32_t generation; /* of the slot that the rest is of */
+  uint32_t flags;      /* HAPI_BODY_*: the slot's, and what was found out in this cycle */
+  bool b_is_good;      /* of the newest testing simulations */
+  bool known_free;     /* model ACCELERANCE: nothing holds it, so nothing was measured */
+  bool measured;       /* model CONTACT: response and b hold a measurement */
   double b[6];
   double response[6][6]; /* wrench at the centre of mass to acceleration */
 } hapi_body_answer;

@@ -9,26 +9,13 @@
 #include "base/log.h"
 #include "base/vec.h"
 
-/* Testing simulations for bodies that the loop of model CONTACT meets but does not own: jointed
- * ones, ones on ground that only ODE's collider knows, and those at the border of the range. Of
- * each the response to a wrench at its centre of mass, 6x6, about the operating point: every
- * probe has the mean wrench of the last interval, so that contacts are loaded as they really
- * are. The bodies that the loop owns are not there in a probe: their contacts are the loop's. */
+/* Testing simulations for bodies that a pointer may touch and that the loop of model CONTACT cannot
+ * own: jointed ones, and ones on ground that only ODE's collider knows. Of each the response to a
+ * wrench at its centre of mass, 6x6, about the operating point: every probe has the mean wrench of
+ * the last interval, so that contacts are loaded as they really are. The bodies that the loop owns are not there in a probe: their contacts are the loop's. */
 
 /* Of the weight: within the plateau between rounding and another set of active contacts. */
 #define PROBE_SHARE 0.01
-
-/* Bodies: what lies behind the border of the range is not worth seven steps of a larger island. */
-#define EDGE_ISLAND_MAX 64u
-
-/* Testing simulations of bodies at the border may take about this share of a period of physics,
- * where a row takes ODE so long an iteration. Counted, not measured: the same in every run. Where
- * the share is too small for one body, one is measured every so many cycles. */
-#define EDGE_SHARE 0.1
-#define EDGE_ROW_S 12e-9
-#define EDGE_REST 8u
-#define EDGE_JOINT_ROWS \
-  2u /* of a joint and each of its bodies: half of a contact, or a whole one */
 
 static hapi_reuse_book *body_book(hapi_probe *probe)
 {
@@ -36,38 +23,6 @@ static hapi_reuse_book *body_book(hapi_probe *probe)
 }
 
 /* ---- which bodies ---- */
-
-static double slot_exchanged_norm(const hapi_body_slot *slot)
-{
-  return hapi_v3_norm(slot->exchanged);
-}
-
-static bool slot_is_edge(const hapi_probe *probe, uint32_t index)
-{
-  const uint32_t role = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
-  const hapi_body_slot *slot = &probe->slots->bodies[index];
-  return slot->phase == HAPI_SLOT_LIVE && slot->wanted &&
-         (probe->answers.bodies[index].flags & role) == 0 && slot_exchanged_norm(slot) > 0.0;
-}
-
-/* Bodies outside of the range that took impulse from the loop: all of them, or none. One that is
- * measured carries the load that others with nothing but their mass give way to, and which one it
- * is changes with the load: a pile flew apart. */
-static void edges_choose(hapi_probe *probe)
-{
-  uint32_t count = 0;
-  for (uint32_t i = 0; i < probe->slots->body_high; ++i) {
-    count += slot_is_edge(probe, i);
-  }
-  for (uint32_t i = 0; i < probe->slots->body_high && count <= probe->cycle->settings.edge_probes;
-       ++i) {
-    hapi_body_answer *answer = &probe->answers.bodies[i];
-    if (slot_is_edge(probe, i)) {
-      answer->edge = true;
-      answer->flags = (answer->flags & ~(uint32_t)HAPI_BODY_RESTING) | HAPI_BODY_MEASURED;
-    }
-  }
-}
 
 /* The islands of the measured bodies. */
 static hap_status bodies_gather(hapi_probe *probe)
@@ -77,20 +32,13 @@ static hap_status bodies_gather(hapi_probe *probe)
   pushed->count = 0;
   hap_status status = hapi_test_begin(test, probe->world, hapi_cycle_test_s(probe->cycle));
   for (uint32_t i = 0; i < probe->slots->body_high && status >= HAP_OK; ++i) {
-    hapi_body_answer *answer = &probe->answers.bodies[i];
+    const hapi_body_answer *answer = &probe->answers.bodies[i];
     if (probe->slots->bodies[i].phase != HAPI_SLOT_LIVE ||
         (answer->flags & HAPI_BODY_MEASURED) == 0 || !hapi_body_is_whole(probe->slots, i)) {
       continue;
     }
     bool testable = false;
-    uint32_t first = test->member_count;
     status = hapi_probe_add_body(probe, i, &testable);
-    if (status >= HAP_OK && testable && answer->edge &&
-        test->member_count - first > EDGE_ISLAND_MAX) {
-      hapi_test_drop_island(test, first);
-      answer->flags &= ~(uint32_t)HAPI_BODY_MEASURED;
-      testable = false;
-    }
     if (status >= HAP_OK && testable) {
       HAPI_ASSERT_INDEX(pushed->count, pushed->capacity);
       pushed->slots[pushed->count++] = i;
@@ -163,7 +111,6 @@ static void body_measure(hapi_probe *probe, uint32_t index, const double base[6]
   double extent = probe->test.world->bodies.entries[slot->known].extent;
   dBodyID body = hapi_test_state(&probe->test, slot->known)->body;
   double a[6][6];
-  probe->answers.bodies[index].measured_in = probe->cycle->model_number;
   for (int axis = 0; axis < 6; ++axis) {
     double wrench[6] = {0.0};
     double column[6];
@@ -188,70 +135,6 @@ static void bodies_measure_base(hapi_probe *probe)
   for (uint32_t i = 0; i < probe->bodies.pushed.count; ++i) {
     uint32_t known = probe->slots->bodies[probe->bodies.pushed.slots[i]].known;
     hapi_test_acceleration(&probe->test, known, probe->bodies.base[i]);
-  }
-}
-
-/* ---- as many as there is room for ---- */
-
-/* How many bodies at the border may be measured in this cycle, each in six steps of all islands. */
-static uint32_t edges_room(const hapi_probe *probe)
-{
-  const hapi_test_set *test = &probe->test;
-  uint64_t rows = 0;
-  for (uint32_t i = 0; i < test->member_count; ++i) {
-    dBodyID body = probe->world->bodies.entries[test->members[i]].body;
-    rows += EDGE_JOINT_ROWS * (uint64_t)dBodyGetNumJoints(body);
-  }
-  double step_s =
-      EDGE_ROW_S * (double)rows * dWorldGetQuickStepNumIterations(probe->world->ode.world);
-  double steps = EDGE_SHARE * probe->cycle->probe_step_s / fmax(step_s, 1e-12);
-  uint32_t room = steps > 1.0 ? (uint32_t)fmin((steps - 1.0) / 6.0, 1e6) : 0;
-  return room > 0 ? room : probe->cycle->model_number % EDGE_REST == 0;
-}
-
-/* Of the bodies at the border the ones that were measured last keep what was found. Whether steps
- * have to be made at all. */
-static bool edges_spare(hapi_probe *probe)
-{
-  const hapi_pushed *pushed = &probe->bodies.pushed;
-  uint32_t edges = 0;
-  for (uint32_t i = 0; i < pushed->count; ++i) {
-    hapi_body_answer *answer = &probe->answers.bodies[pushed->slots[i]];
-    answer->spared = false;
-    edges += answer->edge;
-  }
-  for (uint32_t room = edges_room(probe); edges > room; --edges) {
-    hapi_body_answer *newest = NULL;
-    for (uint32_t i = 0; i < pushed->count; ++i) {
-      hapi_body_answer *answer = &probe->answers.bodies[pushed->slots[i]];
-      if (answer->edge && !answer->spared &&
-          (newest == NULL || answer->measured_in > newest->measured_in)) {
-        newest = answer;
-      }
-    }
-    HAPI_ASSERT(newest != NULL);
-    if (newest != NULL) {
-      newest->spared = true;
-    }
-  }
-  bool any = false;
-  for (uint32_t i = 0; i < pushed->count; ++i) {
-    const hapi_body_answer *answer = &probe->answers.bodies[pushed->slots[i]];
-    any = any || !answer->spared || answer->measured;
-  }
-  return any;
-}
-
-/* The last good response, with the acceleration of this cycle; none: the body is outside. */
-static void edge_keep(hapi_probe *probe, uint32_t index, const double base[6])
-{
-  const hapi_body_slot *slot = &probe->slots->bodies[index];
-  hapi_body_answer *answer = &probe->answers.bodies[index];
-  hapi_reuse_spoil(body_book(probe), &probe->test, slot->known);
-  if (answer->measured && hapi_finite(base, 6)) {
-    answer_keep_b(answer, slot->exchanged, base);
-  } else {
-    answer->flags &= ~(uint32_t)HAPI_BODY_MEASURED;
   }
 }
 
@@ -310,13 +193,9 @@ static hap_status bodies_measure(hapi_probe *probe)
     if (status < HAP_OK) {
       return status;
     }
-    if (edges_spare(probe)) {
-      bodies_measure_base(probe);
-    }
+    bodies_measure_base(probe);
     for (uint32_t i = 0; i < pushed->count; ++i) {
-      uint32_t index = pushed->slots[i];
-      (probe->answers.bodies[index].spared ? edge_keep : body_measure)(probe, index,
-                                                                       probe->bodies.base[i]);
+      body_measure(probe, pushed->slots[i], probe->bodies.base[i]);
     }
     hapi_test_leave(&probe->test);
   }
@@ -328,9 +207,6 @@ void hapi_operating_point_measure(hapi_probe *probe)
 {
   if (probe->cycle->model != HAP_MODEL_CONTACT) {
     return;
-  }
-  if (!hapi_wish_is_off(probe->cycle->wishes, HAP_EFFECT_TESTING)) {
-    edges_choose(probe);
   }
   if (bodies_measure(probe) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for the testing simulations; the last response stays");

@@ -117,7 +117,8 @@ static bool island_can_be_undone(const hapi_test_set *test, uint32_t first)
   return true;
 }
 
-void hapi_test_drop_island(hapi_test_set *test, uint32_t first)
+/* The newest island, whose members begin at first, is under test no more. */
+static void island_drop(hapi_test_set *test, uint32_t first)
 {
   HAPI_ASSERT(test->island_count > 0 && first <= test->member_count);
   for (uint32_t i = first; i < test->member_count; ++i) {
@@ -152,7 +153,7 @@ hap_status hapi_test_add_island(hapi_test_set *test, uint32_t known, bool *out_t
     return HAP_ERROR_MEMORY;
   }
   if (!island_can_be_undone(test, first)) {
-    hapi_test_drop_island(test, first);
+    island_drop(test, first);
     *out_testable = false;
   }
   return HAP_OK;

@@ -56,8 +56,6 @@ hap_status hapi_test_begin(hapi_test_set *test, const hapi_world *world, double 
 /* The island of a body. *out_testable: it can be undone, else nothing was added.
  * HAP_ERROR_MEMORY. */
 hap_status hapi_test_add_island(hapi_test_set *test, uint32_t known, bool *out_testable);
-/* The newest island, whose members begin at first, is under test no more. */
-void hapi_test_drop_island(hapi_test_set *test, uint32_t first);
 /* The body alone, with whatever joints hold it. */
 hap_status hapi_test_add_body(hapi_test_set *test, uint32_t known);
 /* All others off, state saved; on HAP_ERROR_MEMORY nothing has changed. Who slept is awake then. */

@@ -82,7 +82,9 @@ enum {
   HAPI_BODY_ALONE = 256,
   /* Of a MEASURED one: all its rows go by response; else those of its only pointer contact by that
    * contact's a. */
-  HAPI_BODY_WHOLE = 128
+  HAPI_BODY_WHOLE = 128,
+  /* Of one outside of the range: the world beyond it takes up some of the loop's push. */
+  HAPI_BODY_BRACED = 512
 };
 
 /* A slower body gets no gyroscopic term, which would change its rotation in a tick by a

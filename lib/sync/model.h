@@ -169,6 +169,7 @@ typedef struct hapi_model_body {
   double inertia[9];         /* kg m^2, body frame, row-major */
   double inverse_inertia[9]; /* body frame, row-major */
   double gain_taken[6];      /* of hapi_state_body.gain, the same */
+  double brace[6];           /* BRACED: N, N m at the centre, world axes */
   double response[6][6];     /* MEASURED: velocity change per impulse at the centre, world axes */
 } hapi_model_body;
 

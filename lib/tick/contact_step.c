@@ -7,6 +7,7 @@
 #include "base/pose.h"
 #include "local/body_course.h"
 #include "local/body_step.h"
+#include "local/brace_rows.h"
 #include "local/contact_rows.h"
 #include "local/gyro.h"
 #include "local/pointer_forces.h"
@@ -463,6 +464,9 @@ static void rows_make(hapi_tick *tick)
     uint64_t begin = hapi_effect_begin(sample);
     hapi_contact_rows(&tick->contacts, &tick->bodies, rows, &tick->facts, sample);
     hapi_effect_end(sample, HAP_EFFECT_CONTACTS, begin);
+  }
+  if (tick->bodies.braced > 0) {
+    hapi_brace_rows(&tick->bodies, rows, tick->facts.period);
   }
   rows->solver.apart &= rows->solver.row_count == of_pointers;
   rows->work.done = HAPI_ROW_MAKING * (uint64_t)rows->solver.row_count;

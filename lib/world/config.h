@@ -20,7 +20,6 @@ typedef struct hapi_knobs {
   hap_probe probe;
   int32_t max_sweeps;
   int32_t range_hops;
-  int32_t edge_probes;
   int32_t iterations;
   double reuse;
 } hapi_knobs;
@@ -32,8 +31,7 @@ typedef struct hapi_settings {
   uint32_t row_updates; /* the most, in a solve of a tick */
   int32_t range_hops;
   uint32_t range_bodies; /* that the range may own: what a tick has time for */
-  uint32_t edge_probes;
-  double iterations; /* times those of the world; 0: fixed_iterations */
+  double iterations;     /* times those of the world; 0: fixed_iterations */
   int32_t fixed_iterations;
   double reuse; /* m */
   bool shapes;  /* where the effect is auto */
