@@ -27,7 +27,7 @@ typedef enum border_kind {
 typedef struct border_scene {
   border_kind kind;
   int count; /* along the push; bodies of a pile */
-  uint32_t in_loop;
+  int in_loop;
   double hz;
   double overlap; /* m */
   int iterations;
@@ -65,16 +65,19 @@ static void border_make(contact_world *w, const border_scene *s)
   double pitch = EDGE - s->overlap;
   double first = 0.5 * EDGE;
   double z = 0.5 * EDGE - s->overlap;
+  int half = s->count / 2;
   cw_add_floor(w);
   for (int i = 0; i < s->count; ++i) {
     int layer = i / 16;
     int cell = i % 16;
+    int row = cell / 4 - 2;
+    int beyond = i > half ? i - half : 0; /* gaps between hinged cubes */
     switch (s->kind) {
       case BORDER_ROW:
         border_add(w, first + pitch * i, 0.0, z);
         break;
       case BORDER_GRID:
-        for (int k = -s->count / 2; k <= s->count / 2; ++k) {
+        for (int k = -half; k <= half; ++k) {
           border_add(w, first + pitch * i, pitch * k, z);
         }
         break;
@@ -84,17 +87,15 @@ static void border_make(contact_world *w, const border_scene *s)
         }
         break;
       case BORDER_PILE:
-        border_add(w, first + pitch * (cell % 4), pitch * (cell / 4 - 2) + 0.003 * layer,
-                   z + pitch * layer);
+        border_add(w, first + pitch * (cell % 4), pitch * row + 0.003 * layer, z + pitch * layer);
         break;
       case BORDER_CHAIN:
-        border_add(w, first + pitch * i + (i > s->count / 2 ? 0.002 * (i - s->count / 2) : 0.0),
-                   0.0, z);
+        border_add(w, first + pitch * i + 0.002 * beyond, 0.0, z);
         break;
     }
   }
-  for (int i = s->count / 2; s->kind == BORDER_CHAIN && i + 1 < s->count; ++i) {
-    border_hinge(w, i, first + pitch * i + 0.026 + 0.002 * (i - s->count / 2), z);
+  for (int i = half; s->kind == BORDER_CHAIN && i + 1 < s->count; ++i) {
+    border_hinge(w, i, first + pitch * i + 0.026 + 0.002 * (i - half), z);
   }
 }
 
@@ -265,7 +266,7 @@ static double overlap_energy(const border_scene *s)
 static void border_print(const border_scene *s, const border_push *push)
 {
   printf(
-      "# kind %d, %d, %u in the loop, %g Hz, overlap %g mm, %d iterations: force %.2f N, rms "
+      "# kind %d, %d, %d in the loop, %g Hz, overlap %g mm, %d iterations: force %.2f N, rms "
       "%.2f, %.3f m/s, %.4f J from nowhere, work %.4f J\n",
       (int)s->kind, s->count, s->in_loop, s->hz, 1e3 * s->overlap, s->iterations, push->force,
       sqrt(push->force2), push->fastest, push->gained, push->work);
