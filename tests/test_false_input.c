@@ -204,6 +204,21 @@ TEST(noise_fades_and_is_told_within_20_ms)
   CHECK(hand_x() == 0.0 && hand.belief.loss == 0.0);
 }
 
+/* A velocity that the poses do not have would be felt through every damper. */
+TEST(a_twist_stays_near_that_of_the_poses)
+{
+  hand_rest(1, 25 * MS);
+  for (int i = 1; i <= 20; ++i) {
+    CHECK(hand_tell(2e-4 * i, MS));
+    hand.device.twist.linear[0] = 0.3; /* of 0.2 */
+    hapi_input_judge_twist(&hand);
+    CHECK(hand.device.twist.linear[0] == 0.3);
+    hand.device.twist.linear[0] = -6.0;
+    hapi_input_judge_twist(&hand);
+    CHECK(hand.device.twist.linear[0] >= -1.3); /* 0.5 and, of a gap and a half, 0.45 less */
+  }
+}
+
 /* One of a hundred is nothing; of three one is too many. */
 TEST(doubt_adds_up)
 {
@@ -232,6 +247,33 @@ TEST(a_device_that_does_not_believe_itself_comes_in_later)
     (void)hapi_input_judge(&hand, hand_ns, true);
   }
   CHECK(hand.belief.loss == 1.0);
+}
+
+/* A position every 4 ms, and then one 2 mm beside the line: 0.5 mm at once, as of a device that
+ * tells at every ms, and the rest at that pace. Nothing is held back of one that stays on its line,
+ * nor of one that stops. */
+TEST(a_way_of_some_ms_comes_in_over_some_ms)
+{
+  for (int wrong = 0; wrong < 2; ++wrong) {
+    hand_begin();
+    for (int i = 0; i <= 200; ++i) {
+      CHECK(hand_tell(2e-4 * (i - i % 4), MS));
+      CHECK_NEAR(hand_x(), 2e-4 * (i - i % 4), 1e-9);
+    }
+    for (int i = 201; i < 204; ++i) {
+      CHECK(hand_tell(2e-4 * 200, MS));
+    }
+    for (int i = 0; i < 4; ++i) { /* on the line it would be at 204 */
+      double off = wrong != 0 ? 2e-3 : 0.0;
+      double felt = wrong != 0 ? fmin(0.5e-3 * (i + 1), off) : off;
+      CHECK(hand_tell(2e-4 * 204 + off, MS));
+      CHECK_NEAR(hand_x(), 2e-4 * 204 + felt, 2.1e-4); /* the line may go on for a tick */
+    }
+    for (int i = 0; i < 8; ++i) {
+      (void)hand_tell(2e-4 * 204 + (wrong != 0 ? 2e-3 : 0.0), MS);
+      CHECK_NEAR(hand_x(), 2e-4 * 204 + (wrong != 0 ? 2e-3 : 0.0), 1e-9);
+    }
+  }
 }
 
 /* Known after one way that is more than noise; not of a device that tells at every tick. */

@@ -207,6 +207,7 @@ TEST(a_torque_that_no_motion_explains_comes_in_slowly)
 {
   hapi_pointer *p = guarded_and_warm();
   p->device.feels_torque = true;
+  p->device.speed_limit = 10.0;
   p->belief.doubt_s = 0.01;
   hapi_v3_set(p->wrench.force, 0.0, 0.0, 0.0);
   hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.5);
@@ -576,6 +577,7 @@ static double wall_impact(hap_guard mode, double hand_k, double *out_total)
   f.tick.guard.mode = mode;
   hapi_pointer *p = guarded_pointer(0);
   p->surface.stiffness = 500.0;
+  p->device.speed_limit = 10.0;
   hapi_v3_set(p->device.pose.position, 0.0, 0.0, 0.0);
   f.model->model = HAP_MODEL_CONTACT;
   begin_model();
@@ -625,6 +627,125 @@ TEST(an_honest_impact_is_felt_whole)
     CHECK(bare > 2.0 && fabs(kept - bare) <= 0.02 * bare);
     CHECK(hands[i] > 0.0 || f.tick.guard.energy_ticks == 0);
     CHECK(total[1] <= 1.01 * 0.125); /* J that the body brought */
+  }
+}
+
+/* A hand of 0.2 kg comes at a wall, or a body of 0.2 kg at the hand at rest. The largest force, and
+ * all flags in *out_flags. */
+static double fast_impact(hap_guard mode, double stiffness, double speed, bool of_body,
+                          uint32_t *out_flags)
+{
+  double v = of_body ? 0.0 : speed;
+  double peak = 0.0;
+  set_up();
+  f.tick.guard.mode = mode;
+  hapi_pointer *p = guarded_pointer(0);
+  p->device.limits.max_force = 100.0;
+  p->device.limits.slew_force = 1e6;
+  p->device.speed_limit = 10.0;
+  p->surface.stiffness = stiffness;
+  p->surface.damping = 2.0;
+  hapi_v3_set(p->device.pose.position, of_body ? 0.0 : -0.0303, 0.0, 0.0);
+  f.model->model = HAP_MODEL_CONTACT;
+  begin_model();
+  if (of_body) {
+    hapi_model_body *body = add_body(0);
+    body->flags = HAPI_BODY_OWNED;
+    body->mass = 0.2;
+    for (int i = 0; i < 3; ++i) {
+      body->inertia[4 * i] = 1e-3;
+      body->inverse_inertia[4 * i] = 1e3;
+    }
+    body->linear_keep = body->angular_keep = 1.0;
+    body->max_angular_speed = HUGE_VAL;
+    body->pose.position[0] = 0.0603;
+    body->twist.linear[0] = -speed;
+  }
+  hapi_model_contact *c = add_contact(0, of_body ? 0 : HAPI_SLOT_NONE, 0);
+  c->point_body[0] = of_body ? -0.02 : 0.0;
+  model_adopt();
+  p->guard.share = 1.0;
+  *out_flags = 0;
+  for (int i = 0; i < 100; ++i) {
+    ticks_run(1);
+    double force = p->device.wrench.force[0];
+    peak = fmax(peak, fabs(force));
+    *out_flags |= p->guard.flags;
+    if (!of_body) {
+      v += T * force / 0.2;
+      p->device.pose.position[0] += T * v;
+      p->device.twist.linear[0] = v;
+    }
+  }
+  return peak;
+}
+
+TEST(an_impact_at_1_m_s_is_felt_whole_at_the_rated_stiffness)
+{
+  for (int i = 0; i < 6; ++i) {
+    const double stiffness = i % 3 == 0 ? 1000.0 : i % 3 == 1 ? 3000.0 : 8000.0;
+    uint32_t flags[2];
+    double bare = fast_impact(HAP_GUARD_MEASURE, stiffness, 1.0, i >= 3, &flags[0]);
+    double kept = fast_impact(HAP_GUARD_ON, stiffness, 1.0, i >= 3, &flags[1]);
+    printf("# %s at 1 m/s, %g N/m: %.4g N, guarded %.4g\n", i >= 3 ? "body" : "hand", stiffness,
+           bare, kept);
+    CHECK(bare > 10.0 && fabs(kept - bare) <= 0.02 * bare);
+    CHECK((flags[1] & HAP_GUARD_INPUT) == 0);
+  }
+}
+
+/* Force of a pointer that is held, which no motion explains: with the largest force in 30 ms. */
+TEST(what_no_motion_explains_comes_in_slowly)
+{
+  hapi_pointer *p = guarded_and_warm();
+  p->device.speed_limit = 10.0;
+  f.tick.facts.model = HAP_MODEL_CONTACT;
+  for (int i = 1; i <= 20; ++i) {
+    guard_wrench(p, -9.9, 0.0, 0.0);
+    CHECK_NEAR(p->device.wrench.force[0], -fmin(i * LIMIT / 30.0, 9.9), 1e-9);
+    CHECK(((p->guard.flags & HAP_GUARD_INPUT) != 0) == (i < 15));
+  }
+  guard_wrench(p, -5.0, 3.0, 0.0); /* what falls, falls at once; what comes beside it does not */
+  CHECK_NEAR(p->device.wrench.force[0], -5.0, 1e-9);
+  CHECK_NEAR(p->device.wrench.force[1], LIMIT / 30.0, 1e-9);
+  guard_wrench(p, 5.0, 0.0, 0.0);
+  CHECK_NEAR(p->device.wrench.force[0], LIMIT / 30.0, 1e-9);
+  guard_wrench(p, 0.0, 0.0, 0.0);
+  CHECK(p->device.wrench.force[0] == 0.0);
+  p->device.speed_limit = 0.0; /* the application moves it */
+  guard_wrench(p, -5.0, 0.0, 0.0);
+  CHECK(p->device.wrench.force[0] == -5.0);
+}
+
+/* Into a wall by 5 mm in a tick: of a hand that is believed, and of one that was not a moment ago
+ * and went at 0.5 m/s. Then a jump away from it. */
+TEST(a_way_explains_stiffness_times_it)
+{
+  const double slow = LIMIT / 30.0;
+  for (int doubted = 0; doubted < 2; ++doubted) {
+    hapi_pointer *p = guarded_wall();
+    p->device.speed_limit = 10.0;
+    p->device.pose.position[0] = -0.01;
+    p->guard.share = 1.0;
+    f.tick.facts.physics_period = 0.0;
+    f.tick.facts.observes = false; /* nobody paid for the 5 mm */
+    ticks_run(3);
+    p->device.pose.position[0] = -0.005;
+    p->belief.doubted = doubted != 0;
+    p->belief.doubt_s = doubted != 0 ? 1e-3 : 0.0;
+    p->belief.velocity_before[0] = 0.5;
+    ticks_run(1);
+    CHECK_NEAR(p->device.wrench.force[0], doubted != 0 ? -(0.5 + slow) : -5.0, 1e-9);
+    ticks_run(20);
+    CHECK_NEAR(p->device.wrench.force[0], -5.0, 1e-9);
+    p->device.pose.position[0] = -0.007;
+    p->belief.jumped = true;
+    p->belief.doubt_s = 1e-3;
+    ticks_run(1);
+    p->belief.jumped = false;
+    CHECK_NEAR(p->device.wrench.force[0], -(5.0 - slow), 1e-9);
+    ticks_run(8);
+    CHECK_NEAR(p->device.wrench.force[0], -3.0, 1e-9);
   }
 }
 

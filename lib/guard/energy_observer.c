@@ -259,23 +259,9 @@ static double couplings_store(const hapi_pointers *pointers)
 /* J that the written force of contacts gave to the hand in the seconds since the last tick. A way
  * that no hand goes in that time is a jump: nobody put in what it would have cost, and nobody got
  * more than at the fastest. */
-static double port_gave(hapi_pointer *p, double seconds)
+static double port_gave(const hapi_pointer *p, double seconds)
 {
-  hapi_guard_pointer *g = &p->guard;
-  hapi_v3_sub(p->device.pose.position, g->position, g->moved);
-  hapi_v3_copy(p->device.pose.position, g->position);
-  if (p->shape.hull != NULL) { /* to the third order of the turn of a tick; of a sphere none */
-    double back[4] = {g->quat[0], -g->quat[1], -g->quat[2], -g->quat[3]};
-    double q[4];
-    hapi_quat_multiply(p->device.pose.quat_wxyz, back, q);
-    hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, g->turned);
-    memcpy(g->quat, p->device.pose.quat_wxyz, sizeof g->quat);
-  }
-  if (!g->placed) {
-    hapi_v3_set(g->moved, 0.0, 0.0, 0.0);
-    hapi_v3_set(g->turned, 0.0, 0.0, 0.0);
-    g->placed = true;
-  }
+  const hapi_guard_pointer *g = &p->guard;
   double gave = world_per_device(p) * (hapi_v3_dot(g->contact.force, g->moved) +
                                        hapi_v3_dot(g->contact.torque, g->turned));
   double way = hapi_v3_norm(g->moved);

@@ -12,7 +12,7 @@
 #include "pointer/plausible.h"
 
 /* The last thing between the simulation and the motors, in this order: finite, age of the local
- * model, ramp-in, doubt about the device, energy observer, what no motion explains, slew,
+ * model, changes that no motion explains, ramp-in, doubt about the device, energy observer, slew,
  * saturation. All of it shapes what the hand feels; the bodies have had their share of the impulse
  * before. What is declared (pointer/declared.h) has the same shares, is added behind the observer,
  * and has the same limits.
@@ -94,8 +94,123 @@ static void wrench_scale(double share, hap_wrench *io)
   hapi_v3_scale(share, io->torque, io->torque);
 }
 
+/* No farther from the vector before than step. */
+static bool vector_slew(const double before[3], double step, double v[3])
+{
+  double change[3];
+  hapi_v3_sub(v, before, change);
+  double norm = hapi_v3_norm(change);
+  if (norm <= step) {
+    return false;
+  }
+  hapi_v3_madd(before, step / norm, change, v);
+  return true;
+}
+
+/* The way that the device went since the last tick. */
+static void way_follow(hapi_pointer *p)
+{
+  hapi_guard_pointer *g = &p->guard;
+  hapi_v3_sub(p->device.pose.position, g->position, g->moved);
+  hapi_v3_copy(p->device.pose.position, g->position);
+  if (p->shape.hull != NULL) { /* to the third order of the turn of a tick; of a sphere none */
+    double back[4] = {g->quat[0], -g->quat[1], -g->quat[2], -g->quat[3]};
+    double q[4];
+    hapi_quat_multiply(p->device.pose.quat_wxyz, back, q);
+    hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, g->turned);
+    memcpy(g->quat, p->device.pose.quat_wxyz, sizeof g->quat);
+  }
+  if (!g->placed) {
+    hapi_v3_set(g->moved, 0.0, 0.0, 0.0);
+    hapi_v3_set(g->turned, 0.0, 0.0, 0.0);
+    g->placed = true;
+  }
+}
+
+/* N by which motion of the pointer and of the surfaces may have changed its force in this tick. Of a
+ * device that was not believed a moment ago, only the way counts that it would have gone on. */
+static double explained_by_motion(const hapi_pointer *p, double period)
+{
+  const hapi_guard_pointer *g = &p->guard;
+  const hapi_explained *e = &g->explained;
+  const hapi_explained *before = &g->before;
+  double speed = hapi_v3_norm(p->device.twist.linear);
+  double change[3];
+  bool doubted = g->doubted || p->belief.doubted;
+  double way = hapi_v3_norm(g->moved);
+  hapi_v3_sub(p->device.twist.linear, g->velocity, change);
+  double faster = hapi_v3_norm(change);
+  if (p->device.jumped) {
+    way = faster = 0.0;
+  } else if (doubted) {
+    way = hapi_min(way, period * hapi_v3_norm(p->belief.velocity_before));
+    faster = hapi_min(faster, HAPI_SAFETY_ACCELERATION_LIMIT * period);
+  }
+  if (p->shape.hull != NULL && !p->device.jumped) {
+    way += p->shape.extent * hapi_v3_norm(g->turned);
+    faster += p->shape.extent * hapi_v3_norm(p->device.twist.angular);
+  }
+  way *= p->device.motion_scale;
+  faster *= p->device.motion_scale;
+  speed *= p->device.motion_scale;
+  if (p->frame.used) { /* what its base moves it is no doubt about the device */
+    way += hapi_v3_norm(p->frame.step) + p->shape.extent * hapi_v3_norm(p->frame.turned);
+    hapi_v3_sub(p->frame.carries.linear, g->carried, change);
+    faster += hapi_v3_norm(change) + p->shape.extent * hapi_v3_norm(p->frame.carries.angular);
+    speed += hapi_v3_norm(p->frame.carries.linear);
+  }
+  double stiffness = hapi_max(e->stiffness, before->stiffness);
+  double damping = hapi_max(e->damping, before->damping);
+  double begins = fabs(e->damping - before->damping);
+  double surfaces = hapi_max(e->world, before->world) + begins * hapi_max(e->speed, before->speed);
+  return p->device.force_scale * (stiffness * way + damping * faster + begins * speed + surfaces);
+}
+
+/* As far along the vector before as the new one goes, at most: what falls, falls at once. */
+static void vector_fall(double before[3], const double v[3])
+{
+  double norm2 = hapi_v3_dot(before, before);
+  double along = hapi_v3_dot(before, v);
+  if (along < norm2) {
+    hapi_v3_scale(hapi_max(along / norm2, 0.0), before, before);
+  }
+}
+
+/* What no motion explains comes in slowly: from zero to the largest force in UNEXPLAINED_S. In good
+ * order there is no such rest. A force that falls needs no reason: a contact has ended, or a body is
+ * gone, and held longer it would be energy for a hand that draws back. Only of a device that is
+ * doubted it falls as slowly, as the contact may be there still. Bodies of the paper's models leap
+ * at every sync, so there only such a device is held against its motion. A slower slew for all would
+ * be felt as lag, and would put energy into stiff contacts. */
+static void limit_unexplained(const hapi_tick_facts *facts, hapi_pointer *p)
+{
+  double period = facts->period;
+  hapi_guard_pointer *g = &p->guard;
+  bool leaps = facts->model != HAP_MODEL_CONTACT && !(p->belief.doubt_s > 0.0);
+  if (p->device.speed_limit > 0.0 && !leaps) { /* else the application moves it as it likes */
+    double slow = period / HAPI_SAFETY_UNEXPLAINED_S;
+    double explained = explained_by_motion(p, period);
+    if (!(p->belief.doubt_s > 0.0)) {
+      vector_fall(g->came.force, p->device.wrench.force);
+      vector_fall(g->came.torque, p->device.wrench.torque);
+    }
+    bool force = vector_slew(g->came.force, explained + slow * p->device.limits.max_force,
+                             p->device.wrench.force);
+    bool torque = vector_slew(
+        g->came.torque,
+        hapi_max(HAPI_SAFETY_HANDLE, p->shape.extent / p->device.motion_scale) * explained +
+            slow * p->device.limits.max_torque,
+        p->device.wrench.torque);
+    g->flags |= force || torque ? HAP_GUARD_INPUT : 0;
+  }
+  g->came = p->device.wrench;
+  g->doubted = p->belief.doubted;
+  hapi_v3_copy(p->device.twist.linear, g->velocity);
+  hapi_v3_copy(p->frame.carries.linear, g->carried);
+}
+
 /* What the device shall get before the limits. */
-static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p)
+static void pointer_want(const hapi_guard *guard, const hapi_tick_facts *facts, hapi_pointer *p)
 {
   hapi_guard_pointer *g = &p->guard;
   hapi_coupling_write(p);
@@ -107,6 +222,8 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
   if (guard->latch.fault != HAP_FAULT_NONE) {
     bool fades = guard->latch.fault == HAP_FAULT_LATE;
     g->flags = HAP_GUARD_FAULT;
+    g->placed = false; /* the pose may be none */
+    memset(&g->came, 0, sizeof g->came);
     hapi_v3_scale(fades ? guard->late.fade : 0.0, g->written.force, p->device.wrench.force);
     hapi_v3_scale(fades ? guard->late.fade : 0.0, g->written.torque, p->device.wrench.torque);
     memset(&p->declared.given, 0, sizeof p->declared.given); /* it is in what was written */
@@ -115,8 +232,10 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
   if (guard->mode == HAP_GUARD_MEASURE) {
     return;
   }
+  way_follow(p);
+  limit_unexplained(facts, p);
   bool waits = g->share <= 0.0 && p->belief.doubted;
-  double step = period / HAPI_SAFETY_RAMP_IN_S;
+  double step = facts->period / HAPI_SAFETY_RAMP_IN_S;
   g->share = waits      ? 0.0
              : g->fades ? hapi_max(g->share - step, 0.0)
                         : hapi_min(g->share + step, 1.0);
@@ -133,19 +252,6 @@ static void pointer_want(const hapi_guard *guard, double period, hapi_pointer *p
   }
 }
 
-/* No farther from the vector before than step. */
-static bool vector_slew(const double before[3], double step, double v[3])
-{
-  double change[3];
-  hapi_v3_sub(v, before, change);
-  double norm = hapi_v3_norm(change);
-  if (norm <= step) {
-    return false;
-  }
-  hapi_v3_madd(before, step / norm, change, v);
-  return true;
-}
-
 /* Shortens a vector to a norm; its direction stays, and its part has the same share as before. */
 static bool vector_saturate(double v[3], double limit, double part[3])
 {
@@ -156,27 +262,6 @@ static bool vector_saturate(double v[3], double limit, double part[3])
   hapi_v3_scale(limit / norm, v, v);
   hapi_v3_scale(limit / norm, part, part);
   return true;
-}
-
-/* After a device was not believed: the force changes by the stiffness times the way of
- * the device, and the rest, which no motion explains, comes in slowly. A pose that is believed is
- * near the one before, so at other times there is no such rest. */
-static void limit_unexplained(double period, hapi_pointer *p)
-{
-  const hapi_guard_pointer *g = &p->guard;
-  if (!(p->belief.doubt_s > 0.0)) {
-    return;
-  }
-  double slow = period / HAPI_SAFETY_UNEXPLAINED_S;
-  double scale = p->device.motion_scale * p->device.force_scale;
-  double stiffness = p->surface.stiffness * scale * hapi_max((double)p->contacts, 1.0);
-  double explained = p->device.jumped ? 0.0 : stiffness * hapi_v3_norm(g->moved);
-  bool force = vector_slew(g->written.force, explained + slow * p->device.limits.max_force,
-                           p->device.wrench.force);
-  bool torque = vector_slew(g->written.torque,
-                            HAPI_SAFETY_HANDLE * explained + slow * p->device.limits.max_torque,
-                            p->device.wrench.torque);
-  p->guard.flags |= force || torque ? HAP_GUARD_INPUT : 0;
 }
 
 /* A slew limit that is meant for touch does not keep the force on after a fault. */
@@ -264,7 +349,7 @@ void hapi_guard_begin(hapi_guard *guard, const hapi_tick_facts *facts,
   follow_age(guard, facts);
   for (uint32_t i = 0; i < pointers->high; ++i) {
     if (pointers->of[i].generation != 0) {
-      pointer_want(guard, facts->period, &pointers->of[i]);
+      pointer_want(guard, facts, &pointers->of[i]);
     }
   }
 }
@@ -281,9 +366,6 @@ void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *poi
       hapi_wrench_add(&p->device.wrench, &p->declared.given);
     }
     if (guard->mode == HAP_GUARD_ON) {
-      if (guard->latch.fault == HAP_FAULT_NONE) {
-        limit_unexplained(period, p);
-      }
       limit_slew(guard, period, p);
     }
     bool force_cut = vector_saturate(p->device.wrench.force, p->device.limits.max_force,

@@ -3,6 +3,7 @@
 #include "local/pointer_forces.h"
 
 #include "base/vec.h"
+#include "local/explained.h"
 #include "local/pointer_friction.h"
 
 /* A sum that is kept: a force that is not finite, which the guard stops, would stay in it for
@@ -62,6 +63,9 @@ static inline void contact_give(hapi_touches *touches, hapi_pointer *p, const ha
   if (c->force[0] == 0.0 && c->force[1] == 0.0 && c->force[2] == 0.0) {
     return;
   }
+  double depth =
+      c->tool != 0 ? touches->tool.tools[c->tool - 1].depth : c->ramp.depth - c->ramp.excess;
+  hapi_contact_explain(p, c, depth, body, period);
   hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);
   ++p->contacts;
   ++touches->pushing;
@@ -98,6 +102,7 @@ void hapi_pointer_forces(const hapi_tick_facts *facts, const hapi_pointers *poin
 {
   for (uint32_t i = 0; i < pointers->high; ++i) {
     pointers->of[i].contacts = 0;
+    hapi_explained_begin(&pointers->of[i]);
     pointers->of[i].wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   }
   touches->pushing = 0;

@@ -7,6 +7,7 @@
 #include "base/lanes.h"
 #include "base/vec.h"
 #include "local/contact_ramp.h"
+#include "local/explained.h"
 #include "local/pointer_friction.h"
 #include "local/tool_place.h"
 
@@ -206,6 +207,7 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
     hapi_effect_end(sample, HAP_EFFECT_FRICTION, begin);
     force = hapi_v3_norm(c->force);
   }
+  hapi_contact_explain(p, c, depth, NULL, facts->period);
   hapi_v3_sub(p->wrench.force, c->force, p->wrench.force);
   ++p->contacts;
   ++touches->pushing;
@@ -226,6 +228,7 @@ void hapi_render(const hapi_tick_facts *facts, const hapi_pointers *pointers,
   for (uint32_t i = 0; i < pointers->high; ++i) {
     hapi_pointer *p = &pointers->of[i];
     p->contacts = 0;
+    hapi_explained_begin(p);
     p->guard.force2 = p->guard.power = 0.0;
     p->wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   }

@@ -24,6 +24,8 @@
  * several ticks. They are known by the time before each change of more than some quanta; the
  * shortest of the newest ones counts, as a device that rested looks the same once. */
 
+#define HIT_MOST \
+  (HAPI_SAFETY_ACCELERATION_LIMIT * HAPI_SAFETY_JUDGE_S * HAPI_SAFETY_JUDGE_S) /* m */
 #define GAP_TICKS 1.5 /* ticks between two positions, from which on the device is slow */
 
 static double seconds_between(int64_t from_ns, int64_t to_ns)
@@ -48,25 +50,24 @@ static double turn_between(const double a[4], const double b[4])
  * before, but what had begun was seen: the newest pose was off its own line already. */
 static double way_most(const hapi_pointer *p, double seconds, double off_before)
 {
-  double hit = HAPI_SAFETY_ACCELERATION_LIMIT * HAPI_SAFETY_JUDGE_S * HAPI_SAFETY_JUDGE_S;
   double swing = HAPI_SAFETY_SWING_LIMIT * seconds * seconds;
   double begun = sqrt(off_before + p->velocity.quantum) + sqrt(0.5 * swing);
-  return hapi_max(hit, hapi_min(begun * begun, swing)) + HAPI_SAFETY_QUANTA * p->velocity.quantum;
+  return hapi_max(HIT_MOST, hapi_min(begun * begun, swing)) +
+         HAPI_SAFETY_QUANTA * p->velocity.quantum;
 }
 
-/* How far a place is from the way that begins at from and takes so long. */
+/* To a place, from the nearest one on the way that begins at from and takes so long. */
 static double off_way(const double from[3], const double velocity[3], double seconds,
-                      const double at[3])
+                      const double at[3], double out[3])
 {
-  double off[3];
   double along = 0.0;
   double speed2 = hapi_v3_dot(velocity, velocity);
-  hapi_v3_sub(at, from, off);
+  hapi_v3_sub(at, from, out);
   if (speed2 > 0.0) {
-    along = hapi_max(hapi_min(hapi_v3_dot(off, velocity) / speed2, seconds), 0.0);
+    along = hapi_max(hapi_min(hapi_v3_dot(out, velocity) / speed2, seconds), 0.0);
   }
-  hapi_v3_madd(off, -along, velocity, off);
-  return hapi_v3_norm(off);
+  hapi_v3_madd(out, -along, velocity, out);
+  return hapi_v3_norm(out);
 }
 
 /* s between two positions, where they come seldom. */
@@ -92,9 +93,10 @@ static bool pose_is_plausible(const hapi_pointer *p, int64_t now_ns)
   double tick = seconds_between(b->read_ns, now_ns);
   double time = hapi_min(passed, hapi_max(gap_of(b), tick));
   double way[3];
+  double from_way[3];
   hapi_v3_sub(pose->position, b->line.position, way);
   /* What is told now may be of any time in the last tick. */
-  bool off = off_way(b->line.position, b->velocity, passed + tick, pose->position) >
+  bool off = off_way(b->line.position, b->velocity, passed + tick, pose->position, from_way) >
              way_most(p, time, b->off);
   if (hapi_v3_norm(way) > HAPI_SAFETY_SPEED_LIMIT * hapi_max(passed, HAPI_SAFETY_JUDGE_S)) {
     return false;
@@ -132,9 +134,11 @@ static bool goes_on(const hapi_pointer *p, const double way[3], double tick)
   const hapi_elsewhere *e = &p->belief.elsewhere;
   const hap_pose *pose = &p->device.pose;
   double time = hapi_max(e->since, HAPI_SAFETY_JUDGE_S);
-  bool near = e->moved ? off_way(e->pose.position, e->velocity, e->since + tick, pose->position) <=
-                             way_most(p, e->since, e->since * e->since * HAPI_SAFETY_SWING_LIMIT)
-                       : hapi_v3_norm(way) <= HAPI_SAFETY_SPEED_LIMIT * time;
+  double off[3];
+  bool near = e->moved
+                  ? off_way(e->pose.position, e->velocity, e->since + tick, pose->position, off) <=
+                        way_most(p, e->since, e->since * e->since * HAPI_SAFETY_SWING_LIMIT)
+                  : hapi_v3_norm(way) <= HAPI_SAFETY_SPEED_LIMIT * time;
   return near && (!pointer_turns(p) || turn_between(pose->quat_wxyz, e->pose.quat_wxyz) <=
                                            HAPI_SAFETY_SPIN_LIMIT * time);
 }
@@ -273,6 +277,31 @@ static void doubt_follow(hapi_pointer *p, bool doubted, double seconds)
   b->loss = hapi_min(hapi_max(hapi_max(loss, back), 0.0), 1.0);
 }
 
+/* A device that tells seldom went its way in all of the gap, and tells it at once. What it is off
+ * its line by comes in as of a device that tells at every ms: else it would be a step of the force.
+ */
+static void late_take(hapi_pointer *p, int64_t now_ns, double tick)
+{
+  hapi_pointer_belief *b = &p->belief;
+  double passed = seconds_between(b->line_ns, now_ns) + tick;
+  double off[3];
+  if (!(hapi_input_gap(p, tick) > 0.0) || b->jumped) {
+    hapi_v3_set(b->late, 0.0, 0.0, 0.0);
+    return;
+  }
+  double way = off_way(b->line.position, b->velocity, passed, p->device.pose.position, off);
+  double most = HIT_MOST + HAPI_SAFETY_QUANTA * p->velocity.quantum;
+  if (way > most) {
+    hapi_v3_madd(b->late, 1.0 - most / way, off, b->late);
+  }
+}
+
+static void late_follow(hapi_pointer_belief *b, double seconds)
+{
+  double comes = HIT_MOST / HAPI_SAFETY_JUDGE_S * seconds;
+  (void)hapi_v3_shorten(b->late, hapi_max(hapi_v3_norm(b->late) - comes, 0.0));
+}
+
 /* It stands still. */
 static void rest_take(hapi_pointer_belief *b)
 {
@@ -312,7 +341,9 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
   }
   double stood = seconds_between(b->sample_ns, now_ns);
   b->paced = b->paced || stood > HAPI_SAFETY_GAP_MOST_S;
+  late_follow(b, seconds);
   if (believed && news) {
+    late_take(p, now_ns, seconds);
     sample_take(p, now_ns);
   } else if (believed && stood > HAPI_SAFETY_REST_GAPS * gap_or_tick(b)) {
     rest_take(b);
@@ -323,6 +354,7 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
   } else {
     pose_carry(p, now_ns);
   }
+  hapi_v3_sub(p->device.pose.position, b->late, p->device.pose.position);
   b->read_ns = now_ns;
   doubt_follow(p, doubted || !believed, seconds);
   return believed;
@@ -332,6 +364,27 @@ double hapi_input_gap(const hapi_pointer *pointer, double period)
 {
   double gap = gap_of(&pointer->belief);
   return gap > GAP_TICKS * period ? gap : 0.0;
+}
+
+void hapi_input_judge_twist(hapi_pointer *pointer)
+{
+  hapi_pointer *p = pointer;
+  const hapi_pointer_belief *b = &p->belief;
+  double *v = p->device.twist.linear;
+  double off[3];
+  double most = HAPI_SAFETY_ACCELERATION_LIMIT * HAPI_SAFETY_JUDGE_S +
+                HAPI_SAFETY_QUANTA * p->velocity.quantum / HAPI_SAFETY_JUDGE_S;
+  if (!b->known || !b->paced || !hapi_plausible(v, 3)) {
+    return;
+  }
+  if (!p->device.estimates) { /* it may be newer than the line by a gap and a half */
+    most += 1.5 * HAPI_SAFETY_SWING_LIMIT * gap_of(b);
+  }
+  hapi_v3_sub(v, b->velocity, off);
+  if (hapi_v3_dot(off, off) > most * most) {
+    (void)hapi_v3_shorten(off, most);
+    hapi_v3_add(b->velocity, off, v);
+  }
 }
 
 void hapi_input_forgive(hapi_pointer *pointer)

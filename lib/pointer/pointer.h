@@ -96,6 +96,7 @@ typedef struct hapi_pointer_belief {
   double spin;                   /* rad/s */
   double gaps[HAPI_BELIEF_GAPS]; /* s, before the newest steps: a ring */
   hapi_elsewhere elsewhere;
+  double late[3]; /* m, of the position told last: not felt yet */
   double doubt_s;
   double loss; /* 0..1, share of the force that doubt has taken */
 } hapi_pointer_belief;
@@ -204,6 +205,14 @@ typedef struct hapi_rigid_move {
       carried[6]; /* of a god-object: that of the bodies under it, as far as forces leave it out */
 } hapi_rigid_move;
 
+/* What may change the pointer's force in a tick, see local/explained.h. World units. */
+typedef struct hapi_explained {
+  double stiffness; /* N/m, sum over the contacts that push */
+  double damping;   /* N s/m */
+  double speed;     /* m/s, of the fastest surface */
+  double world;     /* N, by motion of the surfaces, and by contacts that come in slowly */
+} hapi_explained;
+
 /* What the guard keeps of a pointer. Device frame and units where nothing else is said; zeroed: a
  * pointer that has just come. */
 typedef struct hapi_guard_pointer {
@@ -213,9 +222,15 @@ typedef struct hapi_guard_pointer {
   bool placed;        /* position and moved are of the device as it is now */
   double position[3]; /* at the last tick */
   double quat[4];
-  double moved[3];    /* since the tick before */
-  double turned[3];   /* rad, likewise, of a device that gives torque */
+  double moved[3];          /* since the tick before */
+  double turned[3];         /* rad, likewise, of a device that gives torque */
+  double velocity[3];       /* m/s, of the device at the last tick */
+  double carried[3];        /* m/s, world: of its base at the last tick */
+  bool doubted;             /* the device, at the last tick */
+  hapi_explained explained; /* of this tick, and of the one before: */
+  hapi_explained before;
   hap_wrench wanted;  /* before the guard */
+  hap_wrench came;    /* of it, what the bound on changes has let in */
   hap_wrench written; /* at the last tick; in force until the next write */
   hap_wrench contact; /* of that, without what was declared */
   uint32_t flags;     /* hap_guard_flag, of the last tick */
