@@ -577,6 +577,37 @@ TEST(old_replies_of_a_fast_grip_are_noticed)
   }
 }
 
+/* The grip goes; every tenth reply is 49 ms old. All of these are refused, and no other, also while
+ * the grip goes the same way again and again. */
+TEST(replies_of_some_time_ago_are_known_again)
+{
+  double old[50][HAPI_SPIDAR_STRINGS_MAX];
+  wires_begin("x4r");
+  int refused = 0;
+  int far = 0;
+  for (int i = 0; i < 3000; ++i) {
+    strings *w = &wires;
+    bool told_old = i > 1000 && i % 10 == 0;
+    double x = 4e-3 * sin(0.031415926535 * i); /* a way of 200 ms */
+    double at[HAPI_SPIDAR_STRINGS_MAX];
+    hapi_spidar_verdict said = HAPI_SPIDAR_BELIEVED;
+    if (told_old) {
+      memcpy(at, old[(i + 1) % 50], sizeof at);
+      w->ns += MS;
+      said = hapi_spidar_belief_update(&w->belief, &w->model, w->ns, at, true);
+      hapi_v3_set(w->grip.position, x, 0.0, 0.0);
+    } else {
+      said = wires_tell(x, 0.0, -1, 0.0);
+      memcpy(old[i % 50], w->counts, sizeof w->counts);
+      CHECK(said == HAPI_SPIDAR_BELIEVED);
+    }
+    refused += said == HAPI_SPIDAR_DOUBTED;
+    far += told_old;
+    CHECK(i < 100 || wires_off() < 3e-4);
+  }
+  CHECK(refused > 0.8 * far && refused <= far);
+}
+
 TEST(strings_without_tension_are_not_judged)
 {
   wires_begin("x4r");

@@ -18,7 +18,9 @@
  *   fit      Lengths that fit no pose. hapi_spidar_diagnose leaves out each string in turn; where
  *            the rest fits without one of them alone, that one is wrong.
  *   counts   A reply that was there before: not one count of all strings has changed, though they
- *            ran fast. Between two counts a hand does not come to rest from such a speed.
+ *            ran fast. Between two counts a hand does not come to rest from such a speed. Or all
+ *            counts are those of some time ago, and not where the strings were going: a hand does
+ *            not leap back to the very count of each string.
  *
  * Where several leave their lengths at once nothing is believed. The bound grows with the time
  * since the newest reply that was: a grip that really jumped is back after some ms. */
@@ -64,7 +66,38 @@ static uint32_t strings_suspect(const hapi_spidar_belief *b, const hapi_spidar_m
   return suspects;
 }
 
-/* Whether it is an old reply. */
+/* Whether all strings have the counts of an older reply; then this one is remembered, too. */
+static bool is_known(hapi_spidar_belief *b, const hapi_spidar_model *model, bool off,
+                     const double *counts)
+{
+  int32_t now[HAPI_SPIDAR_STRINGS_MAX] = {0};
+  bool known = false;
+  uint32_t count = b->replies < HAPI_SPIDAR_REPLIES ? b->replies : HAPI_SPIDAR_REPLIES;
+  for (int i = 0; i < model->strings; ++i) {
+    now[i] = (int32_t)counts[i];
+  }
+  for (uint32_t i = 0; off && i < count && !known; ++i) {
+    known = memcmp(b->reply[i], now, sizeof now) == 0;
+  }
+  memcpy(b->reply[b->replies % HAPI_SPIDAR_REPLIES], now, sizeof now);
+  ++b->replies;
+  return known;
+}
+
+/* Some string is not where it was going, by more than a hand is likely to turn it from there. */
+static bool is_off(const hapi_spidar_belief *b, const hapi_spidar_model *model,
+                   const double rates[HAPI_SPIDAR_STRINGS_MAX], double seconds,
+                   const double lengths[HAPI_SPIDAR_STRINGS_MAX])
+{
+  bool off = false;
+  for (int i = 0; b->known && i < model->strings; ++i) {
+    double way = lengths[i] - b->length[i] - seconds * rates[i];
+    off = off || fabs(way) > HAPI_SAFETY_STALE_QUANTA * metres_of(model, i);
+  }
+  return off;
+}
+
+/* Whether it is the reply before, though the strings run. */
 static bool is_stale(hapi_spidar_belief *b, const hapi_spidar_model *model, int64_t time_ns,
                      const double rates[HAPI_SPIDAR_STRINGS_MAX], const double *counts)
 {
@@ -185,6 +218,8 @@ hapi_spidar_verdict hapi_spidar_belief_update(hapi_spidar_belief *belief,
   uint32_t suspects = strings_suspect(b, model, rates, since, lengths);
   bool stale = is_stale(b, model, time_ns, rates, counts);
   int wrong = taut && can_spare(model) ? string_alone(suspects) : -1;
+  bool off = wrong < 0 && is_off(b, model, rates, since, lengths);
+  stale = is_known(b, model, off, counts) || stale;
   b->update_ns = time_ns;
   bool good = wrong >= 0 ? fits_without(b, model, wrong, lengths)
                          : hapi_spidar_solve(&b->trial, model, lengths) == HAPI_SPIDAR_FIT_GOOD;

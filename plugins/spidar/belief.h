@@ -11,6 +11,8 @@
 #include "plugins/spidar/kinematics.h"
 #include "plugins/spidar/rates.h"
 
+#define HAPI_SPIDAR_REPLIES 256 /* that are remembered, to know them again */
+
 typedef enum hapi_spidar_verdict {
   HAPI_SPIDAR_BELIEVED, /* all strings agree */
   HAPI_SPIDAR_SPARED,   /* all but one agree, which was left out */
@@ -29,6 +31,8 @@ typedef struct hapi_spidar_belief {
   int64_t change_ns;                      /* of the newest in which some count was another one */
   double pace;                            /* m/s, of the fastest string at that one */
   double counts[HAPI_SPIDAR_STRINGS_MAX]; /* as they were read last */
+  uint32_t replies;                       /* that have come; the newest of them, a ring: */
+  int32_t reply[HAPI_SPIDAR_REPLIES][HAPI_SPIDAR_STRINGS_MAX];
   double length[HAPI_SPIDAR_STRINGS_MAX]; /* m, believed; of one left out as it should have been */
   int wrong;                              /* the string that was left out last; < 0: none */
   double error;                           /* m, of it, measured minus fitting */
