@@ -127,8 +127,8 @@ static void way_follow(hapi_pointer *p)
   }
 }
 
-/* N by which motion of the pointer and of the surfaces may have changed its force in this tick. Of a
- * device that was not believed a moment ago, only the way counts that it would have gone on. */
+/* N by which motion of the pointer and of the surfaces may have changed its force in this tick. Of
+ * a device that was not believed a moment ago, only the way counts that it would have gone on. */
 static double explained_by_motion(const hapi_pointer *p, double period)
 {
   const hapi_guard_pointer *g = &p->guard;
@@ -177,11 +177,11 @@ static void vector_fall(double before[3], const double v[3])
 }
 
 /* What no motion explains comes in slowly: from zero to the largest force in UNEXPLAINED_S. In good
- * order there is no such rest. A force that falls needs no reason: a contact has ended, or a body is
- * gone, and held longer it would be energy for a hand that draws back. Only of a device that is
+ * order there is no such rest. A force that falls needs no reason: a contact has ended, or a body
+ * is gone, and held longer it would be energy for a hand that draws back. Only of a device that is
  * doubted it falls as slowly, as the contact may be there still. Bodies of the paper's models leap
- * at every sync, so there only such a device is held against its motion. A slower slew for all would
- * be felt as lag, and would put energy into stiff contacts. */
+ * at every sync, so there only such a device is held against its motion. A slower slew for all
+ * would be felt as lag, and would put energy into stiff contacts. */
 static void limit_unexplained(const hapi_tick_facts *facts, hapi_pointer *p)
 {
   double period = facts->period;
