@@ -12,6 +12,8 @@
 #include "guard/force_guard.h"
 #include "haptic/haptic_internal.h"
 #include "local/contact_ramp.h"
+#include "plugins/spidar/belief.h"
+#include "plugins/spidar/calibration.h"
 #include "pointer/coupling.h"
 #include "pointer/plausible.h"
 #include "tests/tick_world.h"
@@ -225,6 +227,34 @@ TEST(nothing_is_known_of_a_hand_that_was_not_read_for_20_ms)
   CHECK(!hand_tell(0.15, 0.0, 19 * MS));
   hand_rest();
   CHECK(hand_tell(0.15, 0.0, 21 * MS));
+}
+
+/* Turning at 20 rad/s, until the lengths of four strings are 10 mm off. */
+TEST(a_grip_whose_strings_are_false_turns_on_at_10_rad_a_second_at_most)
+{
+  hapi_spidar_model model = *hapi_spidar_model_find("x4r");
+  hapi_spidar_belief belief;
+  hap_pose grip = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  double counts[HAPI_SPIDAR_STRINGS_MAX] = {0.0};
+  double lengths[HAPI_SPIDAR_STRINGS_MAX];
+  hapi_spidar_calibrate_at(&model, NULL, counts);
+  hapi_spidar_belief_begin(&belief, &model, NULL);
+  for (int i = 0; i <= 20; ++i) {
+    bool false_now = i == 20;
+    double angle = 0.02 * i - 0.2;
+    grip.quat_wxyz[0] = cos(0.5 * angle);
+    grip.quat_wxyz[2] = sin(0.5 * angle);
+    hapi_spidar_lengths(&model, &grip, lengths);
+    for (int k = 0; k < model.strings; ++k) {
+      double off = false_now && k < 4 ? (k % 2 == 0 ? 0.01 : -0.01) : 0.0;
+      counts[k] = round((lengths[k] + off - model.offset[k]) / model.metres_per_count[k]);
+    }
+    CHECK(hapi_spidar_belief_update(&belief, &model, i * MS, counts, true) ==
+          (false_now ? HAPI_SPIDAR_DOUBTED : HAPI_SPIDAR_BELIEVED));
+  }
+  const double *q = belief.solver.pose.quat_wxyz;
+  CHECK_NEAR(2.0 * atan2(q[2], q[0]), 0.02 * 19 - 0.2 + 0.01, 5e-4);
+  CHECK_NEAR(hapi_v3_norm(belief.twist.angular), 10.0, 1e-6);
 }
 
 /* ---- the ledger of energy ---- */
