@@ -229,6 +229,51 @@ TEST(nothing_is_known_of_a_hand_that_was_not_read_for_20_ms)
   CHECK(hand_tell(0.15, 0.0, 21 * MS));
 }
 
+/* 5 ms of doubt, and 8 ms without any. */
+TEST(a_second_without_doubt_takes_a_quarter_of_one_away)
+{
+  hand_rest();
+  for (int i = 0; i < 5; ++i) {
+    CHECK(!hand_tell(i % 2 == 0 ? 0.02 : -0.02, 0.0, MS));
+  }
+  CHECK_NEAR(hand.belief.doubt_s, 0.005, 1e-9);
+  for (int i = 0; i < 8; ++i) {
+    CHECK(hand_tell(0.0, 0.0, MS));
+  }
+  CHECK_NEAR(hand.belief.doubt_s, 0.005 - 0.25 * 0.008, 1e-9);
+}
+
+/* The same counts again, of a grip whose fastest string goes at 0.12 m/s: 3.4 counts a ms. */
+TEST(a_reply_is_old_when_a_string_has_not_gone_by_6_counts)
+{
+  hapi_spidar_model model = *hapi_spidar_model_find("x4r");
+  hapi_spidar_belief belief;
+  hap_pose grip = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  double counts[HAPI_SPIDAR_STRINGS_MAX] = {0.0};
+  double lengths[HAPI_SPIDAR_STRINGS_MAX];
+  int64_t ns = 0;
+  int same = 0;
+  hapi_spidar_calibrate_at(&model, NULL, counts);
+  hapi_spidar_belief_begin(&belief, &model, NULL);
+  for (int i = 0; i < 60; ++i, ns += MS) {
+    grip.position[1] = 1e-3 * 0.15 * (i - 30);
+    hapi_spidar_lengths(&model, &grip, lengths);
+    for (int k = 0; k < model.strings; ++k) {
+      counts[k] = round((lengths[k] - model.offset[k]) / model.metres_per_count[k]);
+    }
+    CHECK(hapi_spidar_belief_update(&belief, &model, ns, counts, true) == HAPI_SPIDAR_BELIEVED);
+  }
+  CHECK(belief.pace > 0.105 && belief.pace < 0.2);
+  while (same < 20 &&
+         hapi_spidar_belief_update(&belief, &model, ns, counts, true) == HAPI_SPIDAR_BELIEVED) {
+    ++same;
+    ns += MS;
+  }
+  /* the first of them comes 1 ms after the change */
+  CHECK_SAY(same + 1 == (int)ceil(6.0 * 3.485e-5 / (1e-3 * belief.pace)), "%d, %g m/s", same,
+            belief.pace);
+}
+
 /* Turning at 20 rad/s, until the lengths of four strings are 10 mm off. */
 TEST(a_grip_whose_strings_are_false_turns_on_at_10_rad_a_second_at_most)
 {

@@ -32,12 +32,12 @@ import sys
 import time
 
 GUARD_TESTS = ["guard", "guard_session", "faults", "late", "false_input", "oscillation", "declared",
-               "session_devices", "pointer_set"]
+               "session_devices", "pointer_set", "safety_numbers"]
 WATCH_TESTS = ["emergency", "watchdog", "guard_session", "module", "faults_threads"]
 SPIDAR_TESTS = ["spidar_device", "spidar_errors", "spidar_frames", "spidar_emulator", "spidar",
                 "false_input", "spidar_the"]
 
-CONTACT_TESTS = ["safety_numbers", "haptic_rt"]
+CONTACT_TESTS = ["haptic_rt"]
 
 # Pattern of files: tests that should notice, the fast ones first.
 AREAS = [
@@ -45,11 +45,12 @@ AREAS = [
     ("lib/device/watchdog.c", WATCH_TESTS),
     ("lib/haptic/standstill.c", WATCH_TESTS),
     ("lib/guard/*.c", GUARD_TESTS),
-    ("lib/pointer/plausible.c", ["false_input", "faults", "late"]),
+    ("lib/pointer/plausible.c", ["safety_numbers", "false_input", "faults", "late"]),
     ("lib/base/safety.h", GUARD_TESTS + WATCH_TESTS + SPIDAR_TESTS + CONTACT_TESTS +
      ["spidar_guard"]),
     ("plugins/spidar/guard.c", ["spidar_guard", "spidar"]),
-    ("plugins/spidar/belief.c", ["spidar_device", "false_input", "spidar_emulator"]),
+    ("plugins/spidar/belief.c", ["spidar_device", "safety_numbers", "false_input",
+                                 "spidar_emulator"]),
     ("plugins/spidar/serial.c", ["spidar_errors", "spidar", "spidar_emulator"]),
     ("plugins/spidar/line.c", ["spidar_emulator", "spidar_errors", "spidar"]),
     ("plugins/spidar/cycle.c", ["spidar_frames", "spidar_emulator", "spidar"]),
