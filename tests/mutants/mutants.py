@@ -366,8 +366,9 @@ def find_mutants(scratch, only):
         for mutant in (m for place in found[path] for m in place[3]):
             number += 1
             mutant.number = number
-            mutant.repeat = seen.get(mutant.key(), 0)
-            seen[mutant.key()] = mutant.repeat + 1
+            key = mutant.key()
+            mutant.repeat = seen.get(key, 0)
+            seen[key] = mutant.repeat + 1
     return found
 
 
