@@ -400,7 +400,8 @@ static hap_status session_create(stage *s, hap_detail *detail)
 static hap_status device_open(stage *s, hap_detail *detail)
 {
   if (s->def->device == FALSE_INPUT_SPIDAR) {
-    hap_status status = hapi_device_open_ops(&driven_spidar_ops, hand_path, &s->device, detail);
+    hap_status status =
+        hapi_device_open_ops(&driven_spidar_ops, NULL, hand_path, &s->device, detail);
     if (status >= HAP_OK) {
       driven_spidar *d = hapi_device_self(s->device);
       d->spoil = spidar_spoil;
@@ -412,7 +413,7 @@ static hap_status device_open(stage *s, hap_detail *detail)
   snprintf(spec, sizeof spec, "virtual:hand=relaxed,device_mass=0.1,path=%s%s", hand_path,
            s->def->device == FALSE_INPUT_COARSE ? ",quantum=5e-5" : "");
   opening = s;
-  return hapi_device_open_ops(&wrapped_ops, spec, &s->device, detail);
+  return hapi_device_open_ops(&wrapped_ops, NULL, spec, &s->device, detail);
 }
 
 static hap_status pointer_add(stage *s, hap_detail *detail)

@@ -308,7 +308,7 @@ static hap_status osc_begin(osc_stage *s, hap_detail *detail)
   def.haptic_hz = s->def->haptic_hz;
   research.guard = s->def->unguarded ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
   osc_opening = s;
-  hap_status status = hapi_device_open_ops(&osc_ops, "", &s->device, detail);
+  hap_status status = hapi_device_open_ops(&osc_ops, NULL, "", &s->device, detail);
   status = status >= HAP_OK ? hap_session_create(&def, &ode, &s->session, detail) : status;
   pointer.device = s->device;
   pointer.radius = RADIUS;

@@ -569,7 +569,7 @@ static hap_status storm_hand_open(const double center[3], double radius, double 
   char args[200];
   snprintf(args, sizeof args, "%.17g/%.17g/%.17g/%.17g/%.17g", center[0], center[1], center[2],
            radius, hz);
-  return hapi_device_open_ops(&ops, args, out, detail);
+  return hapi_device_open_ops(&ops, NULL, args, out, detail);
 }
 
 /* while no loop has it */

@@ -177,7 +177,8 @@ static inline hap_device *fake_device_open(hap_device_pacing pacing)
   hap_detail detail = {""};
   hap_device *device = NULL;
   fake_ops.pacing = pacing;
-  REQUIRE_SAY(hapi_device_open_ops(&fake_ops, "", &device, &detail) == HAP_OK, "%s", detail.text);
+  REQUIRE_SAY(hapi_device_open_ops(&fake_ops, NULL, "", &device, &detail) == HAP_OK, "%s",
+              detail.text);
   return device;
 }
 

@@ -234,7 +234,7 @@ static inline bool felt_begin(felt_stage *f, const char *args)
   char spec[400];
   hap_detail detail = {""};
   snprintf(spec, sizeof spec, "%s,max_force=%g", args, FELT_LIMIT);
-  if (hapi_device_open_ops(&felt_ops, spec, &f->device, &detail) != HAP_OK ||
+  if (hapi_device_open_ops(&felt_ops, NULL, spec, &f->device, &detail) != HAP_OK ||
       stage_create(&f->s) != HAP_OK) {
     printf("# %s%s\n", detail.text, f->s.detail.text);
     return false;

@@ -52,7 +52,7 @@ static hap_device_ops counted_ops(void)
 static hap_status open_fake(const hap_device_ops *ops, hap_device **out)
 {
   hap_detail detail = {""};
-  hap_status status = hapi_device_open_ops(ops, "", out, &detail);
+  hap_status status = hapi_device_open_ops(ops, NULL, "", out, &detail);
   CHECK((status < 0) == (*out == NULL));
   CHECK(status >= 0 || detail.text[0] != '\0');
   return status;
@@ -163,7 +163,7 @@ TEST(what_open_does_wrong_is_said)
     hap_device *device = NULL;
     hap_detail detail = {"of before"};
     open_gives = cases[i].gives;
-    CHECK(hapi_device_open_ops(&ops, cases[i].args, &device, &detail) == cases[i].status);
+    CHECK(hapi_device_open_ops(&ops, NULL, cases[i].args, &device, &detail) == cases[i].status);
     CHECK(device == NULL && strstr(detail.text, cases[i].said) != NULL && fakes[0].closes == 0);
     CHECK(strstr(detail.text, "of before") == NULL);
     CHECK(memchr(detail.text, '\0', sizeof detail.text) != NULL);
@@ -273,7 +273,7 @@ TEST(failed_open_keeps_its_text)
   hap_device_ops ops = counted_ops();
   hap_device *device = NULL;
   hap_detail detail;
-  CHECK(hapi_device_open_ops(&ops, "fail", &device, &detail) == HAP_ERROR_DEVICE);
+  CHECK(hapi_device_open_ops(&ops, NULL, "fail", &device, &detail) == HAP_ERROR_DEVICE);
   CHECK(device == NULL && strcmp(detail.text, "fake: no") == 0 && fakes[0].closes == 0);
 }
 

@@ -22,6 +22,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "edit_while_running": "docs/editing.md",
     "sound_on_touch": "docs/touches.md",
     "walk_and_reach": "docs/pointers.md",
+    "own_device": "docs/writing-a-device.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -126,6 +127,13 @@ def check_sound_on_touch(program):
           out)
     said = re.search(r"^at last on wood with ([0-9.]+) N, of which ([0-9.]+) N rub$", out, re.M)
     point(said is not None and 2.5 < float(said.group(1)) < 3.5, "the finger rests on it", out)
+
+
+def check_own_device(program):
+    rows = rows_of(run(program), r"^([0-9.]+) s  (-?[0-9.]+) N$")
+    point(len(rows) == 10, "it prints ten forces", str(rows))
+    point(any(1.5 < float(row[1]) < 2.5 for row in rows), "the floor pushes the hand", str(rows))
+    point(any(float(row[1]) == 0.0 for row in rows), "and not in the air", str(rows))
 
 
 def check_walk_and_reach(program):

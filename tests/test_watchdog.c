@@ -170,7 +170,7 @@ static hap_device *stuck_device_open(const char *name)
 {
   hap_detail detail = {""};
   hap_device *device = NULL;
-  REQUIRE_SAY(hapi_device_open_ops(&stuck_ops, name, &device, &detail) == HAP_OK, "%s",
+  REQUIRE_SAY(hapi_device_open_ops(&stuck_ops, NULL, name, &device, &detail) == HAP_OK, "%s",
               detail.text);
   return device;
 }

@@ -139,6 +139,42 @@ typedef struct hap_device_ops {
   void (*describe_axis)(void *self, uint32_t effector, uint32_t axis, hap_axis_info *out);
 } hap_device_ops;
 
+/* ---- a device in the application ---- */
+
+/* [control] Makes a device of these operations: open gets the context, and "" as arguments. It is
+ * checked as one of a module. ops and what context points to stay until the device is closed.
+ * HAP_ERROR_ARGUMENT: ops or out is NULL; else errors as of hap_device_open, and detail, which may
+ * be NULL, says why. */
+HAP_NODISCARD HAP_API hap_status hap_device_create(const hap_device_ops *ops, void *context,
+                                                   hap_device **out, hap_detail *detail);
+
+/* [control] Makes a device around another: a filter, a recorder, a shaker. All operations of ops
+ * may be NULL, and are then the inner device's; read and write, where they are there, call
+ * hap_device_read and hap_device_write of it. Without open the context is self. The pacing is the
+ * inner device's. describe and describe_axis get what the inner device says, and change it;
+ * effector_count stays. start comes after the inner device's. zero and stop reach the inner device
+ * whatever ops has.
+ *
+ * The inner device is borrowed until the outer one is closed; no pointer can have it meanwhile, and
+ * both may be closed in any order. The guard checks what goes to the outer device: what is added to
+ * it there meets the limits of the inner device alone. HAP_ERROR_STATE: a pointer or another
+ * wrapper has the inner device; else as hap_device_create. */
+HAP_NODISCARD HAP_API hap_status hap_device_wrap(hap_device *inner, const hap_device_ops *ops,
+                                                 void *context, hap_device **out,
+                                                 hap_detail *detail);
+
+/* [haptic, in read of a device around inner] As read of hap_device_ops. HAP_ERROR_STATE: inner is
+ * in no device. */
+HAP_API hap_status hap_device_read(hap_device *inner, int64_t time_ns,
+                                   hap_device_input *const out[]);
+
+/* [haptic, in write of a device around inner] As write of hap_device_ops. What is not finite is
+ * zero of the whole device, and HAP_ERROR_ARGUMENT. */
+HAP_API hap_status hap_device_write(hap_device *inner, const hap_device_output *const wanted[],
+                                    hap_device_output *const reached[]);
+
+/* ---- a device in a module ---- */
+
 /* [control] The one symbol of a loadable device, "module:/whole/path/of/it.so[,ARGS]". host_abi is
  * the HAP_DEVICE_ABI of the library that asks. NULL: the device cannot serve that one. It is called
  * once for every device that is opened, by the thread that opens; there may be several. The table

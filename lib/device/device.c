@@ -49,7 +49,7 @@ static const char *missing_operation(const hap_device_ops *ops)
   return NULL;
 }
 
-static hap_status check_abi(const hap_device_ops *ops, hap_detail *detail)
+hap_status hapi_device_check_abi(const hap_device_ops *ops, hap_detail *detail)
 {
   /* Nothing behind abi may be read before abi is known: its place could hold anything. */
   if (ops->abi != HAP_DEVICE_ABI) {
@@ -70,7 +70,7 @@ static hap_status check_abi(const hap_device_ops *ops, hap_detail *detail)
 
 static hap_status check_ops(const hap_device_ops *ops, hap_detail *detail)
 {
-  HAPI_TRY(check_abi(ops, detail));
+  HAPI_TRY(hapi_device_check_abi(ops, detail));
   if (!name_is_good(ops->name)) {
     return hapi_fail(detail, HAP_ERROR_DEVICE,
                      "the device's name is missing or not made of [a-z0-9_-]");
@@ -259,9 +259,9 @@ static hap_status fail_open(const hap_device_ops *ops, hap_status status, hap_de
   return known;
 }
 
-static hap_status open_self(hap_device *device, const char *args, hap_detail *detail)
+static hap_status open_self(hap_device *device, void *context, const char *args, hap_detail *detail)
 {
-  hap_status status = device->ops->open(NULL, args, &device->self, detail);
+  hap_status status = device->ops->open(context, args, &device->self, detail);
   if (status < 0) {
     return fail_open(device->ops, status, detail);
   }
@@ -272,8 +272,8 @@ static hap_status open_self(hap_device *device, const char *args, hap_detail *de
   return HAP_OK;
 }
 
-hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args, hap_device **out,
-                                hap_detail *detail)
+hap_status hapi_device_open_ops(const hap_device_ops *ops, void *context, const char *args,
+                                hap_device **out, hap_detail *detail)
 {
   HAPI_ASSERT(ops != NULL && args != NULL && detail != NULL);
   *out = NULL;
@@ -285,7 +285,7 @@ hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args, hap
   }
   device->ops = ops;
   atomic_init(&device->holders.bits, 0);
-  hap_status status = open_self(device, args, detail);
+  hap_status status = open_self(device, context, args, detail);
   if (status < 0) {
     hapi_free(device);
     return status;
@@ -330,8 +330,20 @@ hap_status hap_device_open(const char *spec, hap_device **out, hap_detail *detai
     return hapi_module_open(args, out, text);
   }
   const hap_device_ops *ops = hapi_registry_find(spec, length);
-  return ops != NULL ? hapi_device_open_ops(ops, args, out, text)
+  return ops != NULL ? hapi_device_open_ops(ops, NULL, args, out, text)
                      : fail_unknown(spec, length, text);
+}
+
+hap_status hap_device_create(const hap_device_ops *ops, void *context, hap_device **out,
+                             hap_detail *detail)
+{
+  hap_detail unread = {0};
+  hap_detail *text = detail != NULL ? detail : &unread;
+  text->text[0] = '\0';
+  if (out == NULL || ops == NULL) {
+    return hapi_fail(text, HAP_ERROR_ARGUMENT, "hap_device_create: ops or out is NULL");
+  }
+  return hapi_device_open_ops(ops, context, "", out, text);
 }
 
 void hap_device_close(hap_device *device)

@@ -36,13 +36,17 @@ struct hap_device {
   hap_device_output *reached[HAP_EFFECTORS_MAX];
   hapi_device_holders holders;
   void *library; /* of module.h; NULL: built in */
+  bool wrapped;  /* who has claimed it is another device */
 };
 
 /* [control] Opens a device of these ops; the ways to find ops are the registry and module.h. The
  * ops must outlive the device. HAP_ERROR_UNSUPPORTED for another ABI; detail is not NULL and says
  * why it failed. */
-HAP_NODISCARD hap_status hapi_device_open_ops(const hap_device_ops *ops, const char *args,
-                                              hap_device **out, hap_detail *detail);
+HAP_NODISCARD hap_status hapi_device_open_ops(const hap_device_ops *ops, void *context,
+                                              const char *args, hap_device **out,
+                                              hap_detail *detail);
+/* [any] Of a table of which nothing is known yet. */
+HAP_NODISCARD hap_status hapi_device_check_abi(const hap_device_ops *ops, hap_detail *detail);
 
 /* [haptic] Of all end effectors; what was read is in their input, what shall be written in their
  * wanted. */

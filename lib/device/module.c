@@ -186,7 +186,7 @@ static hap_status module_open(module *m, const char *args, hap_device **out)
   HAPI_TRY(module_load(m));
   hap_status status = table_find(m, &ops);
   if (status >= 0) {
-    status = hapi_device_open_ops(ops, args, out, &why);
+    status = hapi_device_open_ops(ops, NULL, args, out, &why);
     if (status < 0) {
       hapi_fail(m->detail, status, "module %.*s: %.290s", PATH_SHOWN, m->path, why.text);
     }

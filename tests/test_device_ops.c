@@ -1,0 +1,400 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Devices that the application makes, and devices around others: by the public headers. */
+
+#include "tests/tap.h"
+
+#include <math.h>
+#include <string.h>
+
+#include <hapode/device_impl.h>
+
+#include "tests/ode_world.h"
+
+#define STIFFNESS 1000.0
+#define RADIUS 0.01
+#define TICK_NS 1000000
+
+/* ---- a device of the test's own ---- */
+
+typedef struct own_hand {
+  double height; /* m, of the hand */
+  bool fails;    /* open, and start */
+  int opens, starts, reads, writes, zeros, stops, closes;
+  double force; /* N, held, up */
+} own_hand;
+
+static hap_status own_open(void *context, const char *args, void **self, hap_detail *detail)
+{
+  own_hand *hand = context;
+  hand->opens += args[0] == '\0';
+  if (hand->fails) {
+    snprintf(detail->text, sizeof detail->text, "the hand is not there");
+    return HAP_ERROR_DEVICE;
+  }
+  *self = hand;
+  return HAP_OK;
+}
+
+static void own_describe(void *self, uint32_t effector, hap_device_info *out)
+{
+  (void)self;
+  (void)effector;
+  out->dof = 3;
+  out->max_force = 8.0;
+  out->workspace_low[2] = -0.1;
+  out->workspace_high[2] = 0.1;
+}
+
+static hap_status own_start(void *self)
+{
+  own_hand *hand = self;
+  ++hand->starts;
+  return hand->fails ? HAP_ERROR_DEVICE : HAP_OK;
+}
+
+static hap_status own_read(void *self, int64_t time_ns, hap_device_input *const out[])
+{
+  own_hand *hand = self;
+  (void)time_ns;
+  ++hand->reads;
+  out[0]->pose = (hap_pose){{0.0, 0.0, hand->height}, {1.0, 0.0, 0.0, 0.0}};
+  memset(&out[0]->twist, 0, sizeof out[0]->twist);
+  out[0]->buttons = 2;
+  return HAP_OK;
+}
+
+static hap_status own_write(void *self, const hap_device_output *const wanted[],
+                            hap_device_output *const reached[])
+{
+  own_hand *hand = self;
+  ++hand->writes;
+  hand->force = wanted[0]->wrench.force[2];
+  reached[0]->wrench = wanted[0]->wrench;
+  return HAP_OK;
+}
+
+static void own_zero(void *self)
+{
+  own_hand *hand = self;
+  ++hand->zeros;
+  hand->force = 0.0;
+}
+
+static void own_stop(void *self)
+{
+  own_hand *hand = self;
+  ++hand->stops;
+  hand->force = 0.0;
+}
+
+static void own_close(void *self)
+{
+  own_hand *hand = self;
+  ++hand->closes;
+}
+
+static const hap_device_ops own_ops = {.abi = HAP_DEVICE_ABI,
+                                       .size = sizeof(hap_device_ops),
+                                       .name = "own",
+                                       .help = "a hand of the test",
+                                       .pacing = HAP_PACING_VIRTUAL,
+                                       .open = own_open,
+                                       .describe = own_describe,
+                                       .start = own_start,
+                                       .read = own_read,
+                                       .write = own_write,
+                                       .zero = own_zero,
+                                       .stop = own_stop,
+                                       .close = own_close};
+
+/* ---- a floor under it ---- */
+
+typedef struct own_stage {
+  dWorldID world;
+  dSpaceID space;
+  hap_session *session;
+  hap_device *device; /* that the pointer has */
+  hap_pointer_id pointer;
+  own_hand hand;
+} own_stage;
+
+static void own_stage_end(void *owned)
+{
+  own_stage *s = owned;
+  ode_world_end(s->session, s->world, s->space);
+  hap_device_close(s->device);
+}
+
+static own_stage *own_stage_new(void)
+{
+  own_stage *s = tap_own(sizeof *s, own_stage_end);
+  ode_world_make(9.81, &s->world, &s->space);
+  dCreatePlane(s->space, 0.0, 0.0, 1.0, 0.0);
+  s->hand.height = 0.05;
+  return s;
+}
+
+static hap_status own_add(own_stage *s)
+{
+  hap_pointer_def def;
+  hap_pointer_def_init(&def, sizeof def);
+  def.device = s->device;
+  def.radius = RADIUS;
+  def.stiffness = STIFFNESS;
+  return hap_pointer_add(s->session, &def, &s->pointer);
+}
+
+static void own_session(own_stage *s)
+{
+  hap_session_def def;
+  hap_ode_def ode;
+  hap_session_def_init(&def, sizeof def);
+  hap_ode_def_init(&ode, sizeof ode);
+  def.drive = HAP_DRIVE_LOCKSTEP;
+  ode.world = s->world;
+  ode.space = s->space;
+  REQUIRE(hap_session_create(&def, &ode, &s->session, NULL) == HAP_OK);
+}
+
+static void own_begin(own_stage *s)
+{
+  own_session(s);
+  REQUIRE(own_add(s) == HAP_OK);
+  REQUIRE(hap_session_start(s->session) == HAP_OK);
+  REQUIRE(hap_session_advance(s->session, 50) >= HAP_OK);
+}
+
+/* Down to a depth [m] in the floor, and there for a while. */
+static void own_press(own_stage *s, double depth)
+{
+  double from = s->hand.height;
+  for (int i = 1; i <= 200; ++i) {
+    s->hand.height = from + (RADIUS - depth - from) * i / 200.0;
+    REQUIRE(hap_session_advance(s->session, 1) >= HAP_OK);
+  }
+  REQUIRE(hap_session_advance(s->session, 50) >= HAP_OK);
+}
+
+TEST(a_device_of_the_application_is_read_and_pushed)
+{
+  own_stage *s = own_stage_new();
+  hap_device_info info;
+  hap_pointer_state state;
+  REQUIRE(hap_device_create(&own_ops, &s->hand, &s->device, NULL) == HAP_OK);
+  CHECK(hap_device_get_info(s->device, &info, sizeof info) == HAP_OK);
+  CHECK(strcmp(info.name, "own") == 0 && info.max_force == 8.0 && info.workspace_high[2] == 0.1);
+  own_begin(s);
+  CHECK(s->hand.force == 0.0);
+  own_press(s, 0.002);
+  CHECK_NEAR(s->hand.force, STIFFNESS * 0.002, 1e-9);
+  REQUIRE(hap_pointer_get(s->session, s->pointer, &state, sizeof state) == HAP_OK);
+  CHECK(state.buttons == 2);
+  own_press(s, 0.02);
+  CHECK_NEAR(s->hand.force, 8.0, 1e-9); /* its own limit */
+  hap_emergency_zero();
+  CHECK(s->hand.force == 0.0);
+  REQUIRE(hap_session_advance(s->session, 20) >= HAP_OK);
+  CHECK(s->hand.force == 0.0);
+  hap_session_stop(s->session);
+  CHECK(s->hand.opens == 1 && s->hand.starts == 1 && s->hand.stops == 1);
+}
+
+TEST(what_cannot_be_made_says_why)
+{
+  own_hand hand = {.fails = true};
+  hap_device *device = (hap_device *)&hand;
+  hap_detail detail = {""};
+  CHECK(hap_device_create(&own_ops, &hand, &device, &detail) == HAP_ERROR_DEVICE);
+  CHECK(device == NULL && strcmp(detail.text, "the hand is not there") == 0);
+  CHECK(hap_device_create(NULL, &hand, &device, &detail) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_device_create(&own_ops, &hand, NULL, &detail) == HAP_ERROR_ARGUMENT);
+  hap_device_ops ops = own_ops;
+  ops.zero = NULL;
+  CHECK(hap_device_create(&ops, &hand, &device, &detail) == HAP_ERROR_DEVICE);
+  CHECK(strstr(detail.text, "'zero'") != NULL);
+  ops = own_ops;
+  ops.abi = 2;
+  CHECK(hap_device_create(&ops, &hand, &device, &detail) == HAP_ERROR_UNSUPPORTED);
+  CHECK(strstr(detail.text, "device ABI 2") != NULL);
+  CHECK(hand.closes == 0);
+}
+
+/* ---- around another ---- */
+
+/* Adds a shake to what the guard has let through, and halves what is read of the height. */
+typedef struct shaker {
+  hap_device *inner;
+  double shake; /* N */
+  int zeros, stops, closes;
+  bool bad;
+} shaker;
+
+static hap_status shaker_read(void *self, int64_t time_ns, hap_device_input *const out[])
+{
+  const shaker *s = self;
+  hap_status status = hap_device_read(s->inner, time_ns, out);
+  out[0]->pose.position[2] *= 0.5;
+  return status;
+}
+
+static hap_status shaker_write(void *self, const hap_device_output *const wanted[],
+                               hap_device_output *const reached[])
+{
+  const shaker *s = self;
+  hap_device_output more = *wanted[0];
+  const hap_device_output *const all[] = {&more};
+  more.wrench.force[2] += s->bad ? (double)NAN : s->shake;
+  return hap_device_write(s->inner, all, reached);
+}
+
+static void shaker_zero(void *self)
+{
+  shaker *s = self;
+  ++s->zeros;
+}
+
+static void shaker_stop(void *self)
+{
+  shaker *s = self;
+  ++s->stops;
+}
+
+static void shaker_close(void *self)
+{
+  shaker *s = self;
+  ++s->closes;
+}
+
+static const hap_device_ops shaker_ops = {.abi = HAP_DEVICE_ABI,
+                                          .size = sizeof(hap_device_ops),
+                                          .name = "shaker",
+                                          .help = "for tests",
+                                          .read = shaker_read,
+                                          .write = shaker_write,
+                                          .zero = shaker_zero,
+                                          .stop = shaker_stop,
+                                          .close = shaker_close};
+
+TEST(a_device_around_another_changes_what_goes_through)
+{
+  own_stage *s = own_stage_new();
+  shaker shakes = {.shake = 0.25};
+  hap_device_info info;
+  REQUIRE(hap_device_create(&own_ops, &s->hand, &shakes.inner, NULL) == HAP_OK);
+  REQUIRE(hap_device_wrap(shakes.inner, &shaker_ops, &shakes, &s->device, NULL) == HAP_OK);
+  CHECK(hap_device_get_info(s->device, &info, sizeof info) == HAP_OK);
+  CHECK(info.max_force == 8.0 && info.dof == 3 && info.pacing == HAP_PACING_VIRTUAL);
+  s->hand.height = 0.1;
+  own_begin(s);
+  CHECK_NEAR(s->hand.force, 0.25, 0.0);
+  own_press(s, -0.006); /* at 16 mm, which half of is 2 mm deep */
+  CHECK_NEAR(s->hand.force, STIFFNESS * 0.002 + 0.25, 1e-9);
+  shakes.bad = true; /* NaN takes all force off, and is a fault */
+  hap_stats stats;
+  REQUIRE(hap_session_advance(s->session, 1) >= HAP_OK);
+  CHECK(s->hand.force == 0.0);
+  REQUIRE(hap_session_stats(s->session, &stats, sizeof stats) == HAP_OK);
+  CHECK(stats.faults.fault == HAP_FAULT_DEVICE_WRITE);
+  hap_session_stop(s->session);
+  CHECK(s->hand.stops == 1 && shakes.stops == 1 && shakes.zeros > 0 && shakes.closes == 0);
+  hap_device_close(shakes.inner); /* in any order */
+  CHECK(s->hand.closes == 0);
+  hap_session_destroy(s->session);
+  s->session = NULL;
+  hap_device_close(s->device);
+  s->device = NULL;
+  CHECK(s->hand.closes == 1 && shakes.closes == 1);
+}
+
+static const hap_device_ops bare_ops = {.abi = HAP_DEVICE_ABI,
+                                        .size = sizeof(hap_device_ops),
+                                        .name = "bare",
+                                        .help = "changes nothing"};
+
+static void two_describe(void *self, uint32_t effector, hap_device_info *out)
+{
+  (void)self;
+  (void)effector;
+  out->effector_count = 2;
+}
+
+/* Zero and stop of the inner device come without any operation of the outer one; two wrappers, one
+ * in the other. */
+TEST(a_device_around_another_without_operations_is_the_other)
+{
+  own_stage *s = own_stage_new();
+  hap_device *inner = NULL;
+  hap_device *middle = NULL;
+  REQUIRE(hap_device_create(&own_ops, &s->hand, &inner, NULL) == HAP_OK);
+  REQUIRE(hap_device_wrap(inner, &bare_ops, NULL, &middle, NULL) == HAP_OK);
+  REQUIRE(hap_device_wrap(middle, &bare_ops, NULL, &s->device, NULL) == HAP_OK);
+  own_begin(s);
+  own_press(s, 0.002);
+  CHECK_NEAR(s->hand.force, STIFFNESS * 0.002, 1e-9);
+  hap_emergency_zero();
+  CHECK(s->hand.force == 0.0);
+  hap_session_stop(s->session);
+  CHECK(s->hand.stops == 1);
+  hap_device_close(middle);
+  hap_device_close(inner);
+}
+
+TEST(a_device_in_another_serves_nobody_else)
+{
+  own_stage *s = own_stage_new();
+  hap_device *outer = NULL;
+  hap_device *second = NULL;
+  hap_device_info info;
+  hap_device_input in = {.size = sizeof in};
+  hap_device_input *const all[] = {&in};
+  hap_detail detail = {""};
+  REQUIRE(hap_device_create(&own_ops, &s->hand, &s->device, NULL) == HAP_OK);
+  CHECK(hap_device_read(s->device, 0, all) == HAP_ERROR_STATE && s->hand.reads == 0);
+  CHECK(hap_device_read(NULL, 0, all) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_device_write(NULL, NULL, NULL) == HAP_ERROR_ARGUMENT);
+  REQUIRE(hap_device_wrap(s->device, &bare_ops, NULL, &outer, NULL) == HAP_OK);
+  CHECK(hap_device_wrap(s->device, &bare_ops, NULL, &second, &detail) == HAP_ERROR_STATE);
+  CHECK(second == NULL && detail.text[0] != '\0');
+  own_session(s);
+  CHECK(own_add(s) == HAP_ERROR_STATE);
+  hap_device_close(outer); /* and it is free again */
+  CHECK(s->hand.closes == 0 && own_add(s) == HAP_OK);
+  CHECK(hap_pointer_remove(s->session, s->pointer) == HAP_OK);
+  hap_device_ops ops = bare_ops;
+  ops.describe = two_describe;
+  REQUIRE(hap_device_wrap(s->device, &ops, NULL, &outer, &detail) == HAP_OK);
+  CHECK(hap_device_get_info(outer, &info, sizeof info) == HAP_OK && info.effector_count == 1);
+  hap_device_close(outer);
+  ops.abi = 2;
+  CHECK(hap_device_wrap(s->device, &ops, NULL, &outer, &detail) == HAP_ERROR_UNSUPPORTED);
+  ops = bare_ops;
+  ops.name = "Bad Name";
+  CHECK(hap_device_wrap(s->device, &ops, NULL, &outer, &detail) == HAP_ERROR_DEVICE);
+  ops = bare_ops;
+  ops.open = own_open;
+  own_hand absent = {.fails = true};
+  CHECK(hap_device_wrap(s->device, &ops, &absent, &outer, &detail) == HAP_ERROR_DEVICE);
+  CHECK(strcmp(detail.text, "the hand is not there") == 0);
+  CHECK(hap_device_wrap(NULL, &ops, NULL, &outer, &detail) == HAP_ERROR_ARGUMENT);
+  CHECK(own_add(s) == HAP_OK); /* nothing of that has kept it */
+}
+
+TEST(a_start_that_fails_leaves_the_inner_device_stopped)
+{
+  own_stage *s = own_stage_new();
+  hap_device *inner = NULL;
+  static own_hand outer; /* both are there until the stage has closed its device */
+  static hap_device_ops ops;
+  ops = bare_ops;
+  ops.start = own_start;
+  REQUIRE(hap_device_create(&own_ops, &s->hand, &inner, NULL) == HAP_OK);
+  REQUIRE(hap_device_wrap(inner, &ops, &outer, &s->device, NULL) == HAP_OK);
+  outer.fails = true;
+  own_session(s);
+  REQUIRE(own_add(s) == HAP_OK);
+  CHECK(hap_session_start(s->session) == HAP_ERROR_DEVICE);
+  CHECK(s->hand.starts == 1 && s->hand.stops == 1 && s->hand.zeros > 0);
+  hap_device_close(inner);
+}
