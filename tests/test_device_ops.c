@@ -398,3 +398,298 @@ TEST(a_start_that_fails_leaves_the_inner_device_stopped)
   CHECK(s->hand.starts == 1 && s->hand.stops == 1 && s->hand.zeros > 0);
   hap_device_close(inner);
 }
+
+/* ---- one device, several hands ---- */
+
+#define FINGERS 3u
+
+/* Each finger has a place of its own along x. */
+typedef struct glove {
+  double height[FINGERS];
+  double force[FINGERS];
+  int starts, reads, writes, zeros, stops;
+  bool fails_read, fails_write;
+  bool bad_pose; /* of the last finger */
+} glove;
+
+static void glove_describe(void *self, uint32_t effector, hap_device_info *out)
+{
+  (void)self;
+  out->dof = 3;
+  out->effector_count = FINGERS;
+  out->max_force = 4.0 + effector;
+}
+
+static hap_status glove_open(void *context, const char *args, void **self, hap_detail *detail)
+{
+  (void)args;
+  (void)detail;
+  *self = context;
+  return HAP_OK;
+}
+
+static hap_status glove_start(void *self)
+{
+  glove *g = self;
+  ++g->starts;
+  return HAP_OK;
+}
+
+static hap_status glove_read(void *self, int64_t time_ns, hap_device_input *const out[])
+{
+  glove *g = self;
+  (void)time_ns;
+  ++g->reads;
+  for (uint32_t i = 0; i < FINGERS; ++i) {
+    out[i]->pose = (hap_pose){{0.1 * i, 0.0, g->height[i]}, {1.0, 0.0, 0.0, 0.0}};
+    memset(&out[i]->twist, 0, sizeof out[i]->twist);
+    out[i]->buttons = 1u << i;
+  }
+  out[FINGERS - 1]->pose.position[1] = g->bad_pose ? (double)NAN : 0.0;
+  return g->fails_read ? HAP_ERROR_DEVICE : HAP_OK;
+}
+
+static hap_status glove_write(void *self, const hap_device_output *const wanted[],
+                              hap_device_output *const reached[])
+{
+  glove *g = self;
+  ++g->writes;
+  for (uint32_t i = 0; i < FINGERS; ++i) {
+    g->force[i] = wanted[i]->wrench.force[2];
+    reached[i]->wrench = wanted[i]->wrench;
+  }
+  return g->fails_write ? HAP_ERROR_DEVICE : HAP_OK;
+}
+
+static void glove_zero(void *self)
+{
+  glove *g = self;
+  ++g->zeros;
+  memset(g->force, 0, sizeof g->force);
+}
+
+static void glove_stop(void *self)
+{
+  glove *g = self;
+  ++g->stops;
+  memset(g->force, 0, sizeof g->force);
+}
+
+static void glove_close(void *self)
+{
+  (void)self;
+}
+
+static const hap_device_ops glove_ops = {.abi = HAP_DEVICE_ABI,
+                                         .size = sizeof(hap_device_ops),
+                                         .name = "glove",
+                                         .help = "fingers",
+                                         .pacing = HAP_PACING_VIRTUAL,
+                                         .open = glove_open,
+                                         .describe = glove_describe,
+                                         .start = glove_start,
+                                         .read = glove_read,
+                                         .write = glove_write,
+                                         .zero = glove_zero,
+                                         .stop = glove_stop,
+                                         .close = glove_close};
+
+typedef struct glove_stage {
+  own_stage s;
+  glove glove;
+  hap_pointer_id fingers[FINGERS];
+} glove_stage;
+
+static void glove_stage_end(void *owned)
+{
+  glove_stage *g = owned;
+  own_stage_end(&g->s);
+}
+
+static hap_status finger_add(glove_stage *g, uint32_t finger)
+{
+  hap_pointer_def def;
+  hap_pointer_def_init(&def, sizeof def);
+  def.device = g->s.device;
+  def.effector = finger;
+  def.radius = RADIUS;
+  def.stiffness = STIFFNESS;
+  hap_pointer_id id;
+  hap_status status = hap_pointer_add(g->s.session, &def, &id);
+  if (status >= HAP_OK && finger < FINGERS) {
+    g->fingers[finger] = id;
+  }
+  return status;
+}
+
+static glove_stage *glove_new(void)
+{
+  glove_stage *g = tap_own(sizeof *g, glove_stage_end);
+  ode_world_make(9.81, &g->s.world, &g->s.space);
+  dCreatePlane(g->s.space, 0.0, 0.0, 1.0, 0.0);
+  REQUIRE(hap_device_create(&glove_ops, &g->glove, &g->s.device, NULL) == HAP_OK);
+  own_session(&g->s);
+  for (uint32_t i = 0; i < FINGERS; ++i) {
+    g->glove.height[i] = RADIUS + 0.001;
+    REQUIRE(finger_add(g, i) == HAP_OK);
+  }
+  return g;
+}
+
+static void glove_run(glove_stage *g, uint32_t ticks)
+{
+  REQUIRE(hap_session_advance(g->s.session, ticks) >= HAP_OK);
+}
+
+/* Each finger goes 1 mm deeper than the one before. */
+static glove_stage *glove_pressing(void)
+{
+  glove_stage *g = glove_new();
+  REQUIRE(hap_session_start(g->s.session) == HAP_OK);
+  glove_run(g, 50);
+  for (int i = 0; i < 40; ++i) {
+    for (uint32_t k = 0; k < FINGERS; ++k) {
+      g->glove.height[k] -= (0.002 + 0.001 * k) / 40.0;
+    }
+    glove_run(g, 1);
+  }
+  glove_run(g, 50);
+  for (uint32_t k = 0; k < FINGERS; ++k) {
+    CHECK_NEAR(g->glove.force[k], STIFFNESS * 0.001 * (k + 1), 1e-9);
+  }
+  return g;
+}
+
+static hap_fault fault_of(const glove_stage *g)
+{
+  hap_stats stats;
+  REQUIRE(hap_session_stats(g->s.session, &stats, sizeof stats) == HAP_OK);
+  return stats.faults.fault;
+}
+
+static bool glove_holds(const glove *g)
+{
+  return g->force[0] != 0.0 || g->force[1] != 0.0 || g->force[2] != 0.0;
+}
+
+TEST(a_device_of_several_fingers_carries_a_pointer_on_each)
+{
+  glove_stage *g = glove_pressing();
+  hap_pointer_state state;
+  int reads = g->glove.reads;
+  int writes = g->glove.writes;
+  glove_run(g, 10); /* once a tick for all of them */
+  CHECK(g->glove.reads == reads + 10 && g->glove.writes == writes + 10 && g->glove.starts == 1);
+  for (uint32_t i = 0; i < FINGERS; ++i) {
+    REQUIRE(hap_pointer_get(g->s.session, g->fingers[i], &state, sizeof state) == HAP_OK);
+    CHECK(state.buttons == 1u << i);
+    CHECK_NEAR(state.device.position[0], 0.1 * i, 0.0);
+    CHECK_NEAR(state.wrench.force[2], STIFFNESS * 0.001 * (i + 1), 1e-9);
+  }
+  for (int i = 0; i < 100; ++i) { /* each has its own limit */
+    g->glove.height[0] -= 1e-4;
+    g->glove.height[2] -= 1e-4;
+    glove_run(g, 1);
+  }
+  CHECK_NEAR(g->glove.force[0], 4.0, 1e-9);
+  CHECK_NEAR(g->glove.force[2], 6.0, 1e-9);
+}
+
+TEST(a_finger_leaves_and_comes_while_the_others_push)
+{
+  glove_stage *g = glove_pressing();
+  int zeros = g->glove.zeros;
+  CHECK(hap_pointer_remove(g->s.session, g->fingers[0]) == HAP_OK);
+  CHECK(g->glove.stops == 0 && g->glove.zeros == zeros);
+  glove_run(g, 1);
+  CHECK(g->glove.force[0] == 0.0);
+  CHECK_NEAR(g->glove.force[1], STIFFNESS * 0.002, 1e-9);
+  CHECK_NEAR(g->glove.force[2], STIFFNESS * 0.003, 1e-9);
+  CHECK(finger_add(g, 0) == HAP_OK && g->glove.starts == 1);
+  glove_run(g, 200);
+  CHECK_NEAR(g->glove.force[0], STIFFNESS * 0.001, 1e-9);
+  for (uint32_t i = 0; i < FINGERS; ++i) {
+    CHECK(hap_pointer_remove(g->s.session, g->fingers[i]) == HAP_OK);
+    CHECK(g->glove.stops == (i == FINGERS - 1 ? 1 : 0));
+  }
+  CHECK(!glove_holds(&g->glove) && g->glove.zeros > zeros);
+}
+
+TEST(a_fault_of_a_device_takes_the_force_of_all_its_fingers)
+{
+  for (int kind = 0; kind < 4; ++kind) {
+    static const hap_fault faults[] = {HAP_FAULT_DEVICE_READ, HAP_FAULT_DEVICE_WRITE,
+                                       HAP_FAULT_DEVICE_POSE, HAP_FAULT_EMERGENCY};
+    glove_stage *g = glove_pressing();
+    g->glove.fails_read = kind == 0;
+    g->glove.fails_write = kind == 1;
+    g->glove.bad_pose = kind == 2;
+    if (kind == 3) {
+      hap_emergency_zero();
+    }
+    glove_run(g, kind == 2 ? 30 : 1); /* a pose that is not finite fades out */
+    CHECK(!glove_holds(&g->glove));
+    CHECK(fault_of(g) == faults[kind]);
+    g->glove.fails_read = g->glove.fails_write = g->glove.bad_pose = false;
+    glove_run(g, 20);
+    CHECK(!glove_holds(&g->glove));
+    CHECK(hap_session_reset_fault(g->s.session) >= HAP_OK);
+    glove_run(g, 100);
+    CHECK_NEAR(g->glove.force[2], STIFFNESS * 0.003, 1e-9);
+    tap_release(g);
+  }
+}
+
+TEST(a_restart_of_one_finger_is_one_of_the_device)
+{
+  glove_stage *g = glove_pressing();
+  CHECK(hap_pointer_restart(g->s.session, g->fingers[1]) == HAP_OK);
+  CHECK(g->glove.starts == 2 && g->glove.stops == 1 && !glove_holds(&g->glove));
+  glove_run(g, 200);
+  for (uint32_t k = 0; k < FINGERS; ++k) {
+    CHECK_NEAR(g->glove.force[k], STIFFNESS * 0.001 * (k + 1), 1e-9);
+  }
+  hap_session_stop(g->s.session);
+  CHECK(g->glove.stops == 2);
+}
+
+TEST(an_end_effector_has_one_pointer_and_a_device_one_session)
+{
+  glove_stage *g = glove_new();
+  hap_session *second = NULL;
+  hap_session *first = g->s.session;
+  hap_device *outer = NULL;
+  hap_detail detail = {""};
+  CHECK(finger_add(g, 1) == HAP_ERROR_STATE);
+  CHECK(finger_add(g, FINGERS) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_detail(first, &detail) >= HAP_OK && strstr(detail.text, "effector") != NULL);
+  CHECK(hap_pointer_remove(first, g->fingers[1]) == HAP_OK);
+  CHECK(hap_device_wrap(g->s.device, &bare_ops, NULL, &outer, NULL) == HAP_ERROR_STATE);
+  dWorldID world = g->s.world;
+  dSpaceID space = g->s.space;
+  ode_world_make(9.81, &g->s.world, &g->s.space);
+  own_session(&g->s);
+  second = g->s.session;
+  CHECK(finger_add(g, 1) == HAP_ERROR_STATE); /* the others are the first session's */
+  hap_pointer_id fingers[] = {g->fingers[0], g->fingers[2]};
+  CHECK(hap_pointer_remove(first, fingers[0]) == HAP_OK);
+  CHECK(hap_pointer_remove(first, fingers[1]) == HAP_OK);
+  CHECK(finger_add(g, 1) == HAP_OK && g->s.session == second);
+  ode_world_end(first, world, space);
+}
+
+/* A device with one end effector, and a pointer without a device, have the first one alone. */
+TEST(the_first_end_effector_is_the_only_one_of_others)
+{
+  own_stage *s = own_stage_new();
+  hap_pointer_def def;
+  REQUIRE(hap_device_create(&own_ops, &s->hand, &s->device, NULL) == HAP_OK);
+  own_session(s);
+  hap_pointer_def_init(&def, sizeof def);
+  def.effector = 1;
+  CHECK(hap_pointer_add(s->session, &def, &s->pointer) == HAP_ERROR_ARGUMENT);
+  def.device = s->device;
+  CHECK(hap_pointer_add(s->session, &def, &s->pointer) == HAP_ERROR_ARGUMENT);
+  def.effector = 0;
+  CHECK(hap_pointer_add(s->session, &def, &s->pointer) == HAP_OK);
+}

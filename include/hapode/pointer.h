@@ -30,7 +30,7 @@ typedef struct hap_pointer_def {
   uint32_t size;   /* set by hap_pointer_def_init */
   uint32_t cookie; /* set by hap_pointer_def_init */
 
-  /* Borrowed, one pointer for each device. NULL (default): hap_pointer_set_target moves the
+  /* Borrowed, one pointer for each of its end effectors, all of one session. NULL (default): hap_pointer_set_target moves the
    * pointer, and it is not in the world before its first target. */
   hap_device *device;
   hap_pose pose_world_device; /* of the device's frame in the world, default identity */
@@ -76,6 +76,11 @@ typedef struct hap_pointer_def {
 
   const struct hap_pointer_expert_def *expert;     /* copied by add; NULL (default): its defaults */
   const struct hap_pointer_research_def *research; /* copied by add; NULL (default): its defaults */
+
+  /* From 0 (default): which end effector of the device, below effector_count of hap_device_info.
+   * Each may have a pointer of its own. */
+  uint32_t effector;
+  uint32_t reserved;
 } hap_pointer_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
@@ -84,8 +89,8 @@ HAP_API void hap_pointer_def_init(hap_pointer_def *def, size_t size_of_def);
 /* [control] Adds a pointer, also while running. It feels forces from the next sync on, over 20
  * ms. *def and what it refers to are copied, but the device is borrowed until the pointer is
  * removed. HAP_ERROR_ARGUMENT, HAP_ERROR_UNSUPPORTED: hap_session_detail names the field.
- * HAP_ERROR_CAPACITY: more than max_pointers. HAP_ERROR_STATE: the device serves another
- * pointer, of this session or another one, or the session plays a recording. HAP_ERROR_DEVICE:
+ * HAP_ERROR_CAPACITY: more than max_pointers. HAP_ERROR_STATE: the end effector serves another
+ * pointer, the device one of another session, or the session plays a recording. HAP_ERROR_DEVICE:
  * it did not start. */
 HAP_NODISCARD HAP_API hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def,
                                                  hap_pointer_id *out);
@@ -97,7 +102,8 @@ HAP_API hap_status hap_pointer_remove(hap_session *session, hap_pointer_id point
 
 /* [control] Stops the pointer's device and starts it again: for one that was lost, unplugged or
  * switched off and must be opened anew. Blocks as long as the device's start does; the loop and the
- * other pointers go on. The pointer is out of the world meanwhile, and its id stays valid.
+ * pointers of other devices go on. All pointers of the device are out of the world meanwhile, and
+ * their ids stay valid.
  *
  * A force that a fault took away stays away until hap_session_reset_fault. Without a fault the
  * pointer comes in as one that was just added. HAP_ERROR_DEVICE: it did not start; the pointer

@@ -37,6 +37,8 @@ typedef struct hapi_pointer_setup {
   double finger_radius;
   double virtual_mass;
   double virtual_inertia;
+  uint32_t effector;
+  uint32_t reserved;
 } hapi_pointer_setup;
 
 /* Bits of a setting beside those of the API. */

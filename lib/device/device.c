@@ -17,8 +17,8 @@
 #define AXIS_MOST 1e6      /* of the values of an axis */
 #define WORKSPACE_MOST 1e3 /* m */
 
-#define CLAIMED 1u
-#define CLOSED 2u
+#define ALL_EFFECTORS 0xffffu
+#define CLOSED 0x10000u
 
 static bool name_is_good(const char *name)
 {
@@ -285,6 +285,7 @@ hap_status hapi_device_open_ops(const hap_device_ops *ops, void *context, const 
   }
   device->ops = ops;
   atomic_init(&device->holders.bits, 0);
+  atomic_init(&device->holders.owner, NULL);
   hap_status status = open_self(device, context, args, detail);
   if (status < 0) {
     hapi_free(device);
@@ -414,24 +415,59 @@ void hapi_device_explain(const hap_device_ops *ops, void *self, hap_detail *out)
   }
 }
 
+static void wanted_clear(hap_device *device, uint32_t effector)
+{
+  hap_device_output *wanted = &device->effectors[effector].wanted;
+  *wanted = (hap_device_output){.size = sizeof *wanted};
+}
+
 bool hapi_device_claim(hap_device *device)
 {
   unsigned nobody = 0;
   bool claimed = atomic_compare_exchange_strong_explicit(
-      &device->holders.bits, &nobody, CLAIMED, memory_order_acq_rel, memory_order_relaxed);
+      &device->holders.bits, &nobody, ALL_EFFECTORS, memory_order_acq_rel, memory_order_relaxed);
   for (uint32_t i = 0; claimed && i < device->effector_count; ++i) {
-    hapi_effector *effector = &device->effectors[i];
-    effector->wanted = (hap_device_output){.size = sizeof effector->wanted};
+    wanted_clear(device, i);
   }
   return claimed;
 }
 
-void hapi_device_release(hap_device *device)
+bool hapi_device_claim_effector(hap_device *device, const void *session, uint32_t effector)
 {
-  unsigned before =
-      atomic_fetch_and_explicit(&device->holders.bits, ~CLAIMED, memory_order_acq_rel);
-  HAPI_ASSERT((before & CLAIMED) != 0);
-  if ((before & CLOSED) != 0) {
+  HAPI_ASSERT_INDEX(effector, device->effector_count);
+  hapi_device_holders *holders = &device->holders;
+  unsigned bit = 1u << effector;
+  unsigned before = atomic_load(&holders->bits);
+  do {
+    bool foreign = (before & ALL_EFFECTORS) != 0 && atomic_load(&holders->owner) != session;
+    if (foreign || (before & (CLOSED | bit)) != 0) {
+      return false;
+    }
+  } while (!atomic_compare_exchange_weak(&holders->bits, &before, before | bit));
+  atomic_store(&holders->owner, session);
+  wanted_clear(device, effector);
+  return true;
+}
+
+static void bits_release(hap_device *device, unsigned bits)
+{
+  unsigned held = atomic_load(&device->holders.bits) & ALL_EFFECTORS;
+  HAPI_ASSERT((held & bits) == bits);
+  if (held == bits) {
+    atomic_store(&device->holders.owner, NULL); /* before others can claim it */
+  }
+  unsigned before = atomic_fetch_and_explicit(&device->holders.bits, ~bits, memory_order_acq_rel);
+  if (before == (bits | CLOSED)) {
     device_free(device);
   }
+}
+
+void hapi_device_release(hap_device *device)
+{
+  bits_release(device, ALL_EFFECTORS);
+}
+
+void hapi_device_release_effector(hap_device *device, uint32_t effector)
+{
+  bits_release(device, 1u << effector);
 }

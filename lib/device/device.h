@@ -10,11 +10,27 @@
 #include <hapode/device.h>
 #include <hapode/device_impl.h>
 
-/* Who holds the device, as bits: a pointer (claimed), and the application until it has closed it.
- * The last one to let go frees it, so closing before the session stopped is late, not fatal. */
+#include "device/watchdog.h"
+
+/* Who holds the device, as bits: one for each end effector that a pointer has, and one when the
+ * application has closed it. The last one to let go frees it, so closing before the session stopped
+ * is late, not fatal. */
 typedef struct hapi_device_holders {
   atomic_uint bits;
+  _Atomic(const void *)
+      owner; /* of the pointers; NULL: there is none, or it has all of the device */
 } hapi_device_holders;
+
+/* A running device and the pointers that have its end effectors. */
+typedef struct hapi_device_drive {
+  uint32_t users;         /* pointers for which it was started [control] */
+  uint32_t active;        /* pointers in the loop [haptic, with those below] */
+  uint32_t filled;        /* of those, whose output of this tick is in wanted */
+  uint64_t read_number;   /* as the loop counts them: of the last read */
+  hap_status read_status; /* of that one */
+  hap_status write_status;
+  hapi_watchdog watchdog;
+} hapi_device_drive;
 
 /* What is known of an end effector is asked once, at open: the session may read it while the loop
  * runs. The rest is the loop's. */
@@ -35,6 +51,7 @@ struct hap_device {
   const hap_device_output *wanted[HAP_EFFECTORS_MAX];
   hap_device_output *reached[HAP_EFFECTORS_MAX];
   hapi_device_holders holders;
+  hapi_device_drive drive;
   void *library; /* of module.h; NULL: built in */
   bool wrapped;  /* who has claimed it is another device */
 };
@@ -80,8 +97,14 @@ HAP_NODISCARD bool hapi_device_figures_good(const double *figures, size_t count)
 /* [any] What the device says of its last failure; "" when it says nothing. */
 void hapi_device_explain(const hap_device_ops *ops, void *self, hap_detail *out);
 
-/* [control] A pointer takes the device; false when another one has it or it was closed. */
+/* [control] Takes all of the device; false when somebody has a part of it or it was closed. */
 HAP_NODISCARD bool hapi_device_claim(hap_device *device);
+
+/* [control] A pointer of a session takes an end effector; false when another one has it, a pointer
+ * of another session has one, or the device was closed. */
+HAP_NODISCARD bool hapi_device_claim_effector(hap_device *device, const void *session,
+                                              uint32_t effector);
+void hapi_device_release_effector(hap_device *device, uint32_t effector); /* after ops->stop */
 
 /* [control] After ops->stop. Frees the device when it was closed in the meantime. */
 void hapi_device_release(hap_device *device);

@@ -49,7 +49,6 @@ typedef struct hapi_pointer_slot {
   hapi_effector *effector; /* NULL: likewise */
   bool has_device;         /* also in a replay, where there are no ops */
   bool started;
-  hapi_watchdog watchdog;
   hap_device_info info;
   pthread_mutex_t lock; /* between applications that set, get, ask and remove */
   hapi_triple_buffer target_buffer;
@@ -189,6 +188,7 @@ struct hapi_haptic {
   hapi_standstill standstill;
   hapi_told_things told;
   uint64_t emergencies; /* calls of hap_emergency_zero that the loop has seen */
+  uint64_t reads;       /* of all devices, since the loop was made */
   bool begun;
   int64_t start_ns;
   hapi_loop_time time;

@@ -118,6 +118,25 @@ static int phase_after(int way)
   return way == HAPI_POINTER_LEAVING ? HAPI_POINTER_LEFT : HAPI_POINTER_PAUSED;
 }
 
+/* The last pointer of a device takes all force with it. Before that the others go on: the next
+ * write, in this tick, has no force for this end effector. */
+static void device_leave(hapi_pointer_slot *slot, bool was_active)
+{
+  if (slot->ops == NULL) {
+    return;
+  }
+  hapi_device_drive *drive = &slot->def.device->drive;
+  hap_device_output *wanted = &slot->effector->wanted;
+  *wanted = (hap_device_output){.size = sizeof *wanted};
+  if (was_active && slot->started) {
+    HAPI_ASSERT(drive->active > 0);
+    --drive->active;
+  }
+  if (drive->active == 0) {
+    slot->ops->zero(slot->self);
+  }
+}
+
 void hapi_pointers_follow(hapi_haptic *haptic)
 {
   HAPI_ASSERT(hapi_thread_is_mine(&haptic->thread));
@@ -133,14 +152,15 @@ void hapi_pointers_follow(hapi_haptic *haptic)
     if (phase == HAPI_POINTER_ADDED && ready) {
       hapi_settings_swap(slot);
       pointer_activate(haptic, i);
+      if (slot->ops != NULL) {
+        ++slot->def.device->drive.active;
+      }
       hapi_tape_join(haptic, i);
       /* Fails when the application wants it back meanwhile: seen at the next tick. */
       (void)atomic_compare_exchange_strong(&slot->phase, &phase, HAPI_POINTER_ACTIVE);
     } else if (phase == HAPI_POINTER_LEAVING || phase == HAPI_POINTER_PAUSING) {
+      device_leave(slot, haptic->tick.pointers.of[i].generation != 0);
       haptic->tick.pointers.of[i].generation = 0;
-      if (slot->ops != NULL) {
-        slot->ops->zero(slot->self);
-      }
       hapi_tape_leave(haptic, i, phase == HAPI_POINTER_PAUSING);
       atomic_store_explicit(&slot->phase, phase_after(phase), memory_order_release);
     }
@@ -158,12 +178,23 @@ static void fail_device(hapi_haptic *haptic, uint32_t index, hap_fault fault)
   hapi_tick_fault(&haptic->tick, fault, index + 1);
 }
 
+/* The first of its pointers reads all of a device. */
+static hap_status device_read_once(hapi_haptic *haptic, uint32_t index, int64_t now_ns)
+{
+  hap_device *device = haptic->slots[index].def.device;
+  if (device->drive.read_number != haptic->reads) {
+    hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_READ, index);
+    device->drive.read_number = haptic->reads;
+    device->drive.read_status = hapi_device_read(device, now_ns);
+  }
+  return device->drive.read_status;
+}
+
 static void ask_device(hapi_haptic *haptic, uint32_t index, int64_t now_ns, hapi_pointer_input *io)
 {
   hapi_pointer_slot *slot = &haptic->slots[index];
   if (slot->ops != NULL) {
-    hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_READ, index);
-    hap_status status = hapi_device_read(slot->def.device, now_ns);
+    hap_status status = device_read_once(haptic, index, now_ns);
     const hap_device_input *in = &slot->effector->input;
     io->pose = in->pose;
     io->twist = in->twist;
@@ -180,6 +211,7 @@ static void ask_device(hapi_haptic *haptic, uint32_t index, int64_t now_ns, hapi
 
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
 {
+  ++haptic->reads;
   for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     hapi_pointer *p = &haptic->tick.pointers.of[i];
@@ -216,8 +248,26 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
   }
 }
 
+/* The last of its pointers writes all of a device. */
+static void device_fill(hapi_haptic *haptic, uint32_t index)
+{
+  const hapi_pointer_slot *slot = &haptic->slots[index];
+  hap_device *device = slot->def.device;
+  slot->effector->wanted.wrench = haptic->tick.pointers.of[index].device.wrench;
+  if (++device->drive.filled >= device->drive.active) {
+    hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_WRITE, index);
+    device->drive.filled = 0;
+    device->drive.write_status = hapi_device_write(device);
+  }
+}
+
 void hapi_pointers_write(hapi_haptic *haptic)
 {
+  for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
+    if (haptic->tick.pointers.of[i].generation != 0 && haptic->slots[i].ops != NULL) {
+      device_fill(haptic, i);
+    }
+  }
   for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     hapi_pointer *p = &haptic->tick.pointers.of[i];
@@ -226,9 +276,7 @@ void hapi_pointers_write(hapi_haptic *haptic)
     }
     hapi_pointer_output out = {.reached = p->device.wrench};
     if (slot->ops != NULL) {
-      hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_WRITE, i);
-      slot->effector->wanted.wrench = p->device.wrench;
-      out.failed = !hapi_device_did(hapi_device_write(slot->def.device));
+      out.failed = !hapi_device_did(slot->def.device->drive.write_status);
       out.reached = slot->effector->reached.wrench;
     }
     if (haptic->tape != NULL) {
@@ -283,7 +331,14 @@ static bool stop_device(hapi_pointer_slot *slot)
   if (slot->ops == NULL || !slot->started) {
     return true;
   }
-  if (!hapi_watchdog_stop(&slot->watchdog)) {
+  hapi_device_drive *drive = &slot->def.device->drive;
+  HAPI_ASSERT(drive->users > 0);
+  if (drive->users > 1) { /* it goes on for its other pointers */
+    --drive->users;
+    slot->started = false;
+    return true;
+  }
+  if (!hapi_watchdog_stop(&drive->watchdog)) {
     return false;
   }
   if (!hapi_emergency_is_zeroing(slot->ops, slot->self)) {
@@ -293,6 +348,7 @@ static bool stop_device(hapi_pointer_slot *slot)
     return false;
   }
   slot->ops->stop(slot->self);
+  drive->users = drive->active = 0;
   slot->started = false;
   return true;
 }
@@ -301,6 +357,12 @@ static hap_status start_device(hapi_haptic *haptic, hapi_pointer_slot *slot, hap
 {
   HAPI_ASSERT(slot >= haptic->slots && slot < haptic->slots + haptic->config.capacity.pointers);
   if (slot->ops == NULL || slot->started) {
+    return HAP_OK;
+  }
+  hapi_device_drive *drive = &slot->def.device->drive;
+  if (drive->users > 0) { /* for another pointer */
+    ++drive->users;
+    slot->started = true;
     return HAP_OK;
   }
   if (haptic->config.lockstep && slot->ops->pacing != HAP_PACING_VIRTUAL) {
@@ -322,6 +384,8 @@ static hap_status start_device(hapi_haptic *haptic, hapi_pointer_slot *slot, hap
                      HAPI_EMERGENCY_DEVICES);
   }
   slot->started = true;
+  drive->users = 1;
+  drive->active = drive->filled = 0;
   hap_status watched = hapi_standstill_watch(haptic, (uint32_t)(slot - haptic->slots));
   if (watched < HAP_OK) {
     (void)stop_device(slot);
@@ -412,11 +476,11 @@ static void fill_slot(hapi_pointer_slot *slot, const hapi_pointer_setup *def)
   }
   slot->ops = def->device != NULL ? hapi_device_ops(def->device) : NULL;
   slot->self = def->device != NULL ? hapi_device_self(def->device) : NULL;
-  slot->effector = def->device != NULL ? &def->device->effectors[0] : NULL;
+  slot->effector = def->device != NULL ? &def->device->effectors[def->effector] : NULL;
   slot->has_device = def->device != NULL;
   memset(&slot->info, 0, sizeof slot->info);
   if (def->device != NULL) {
-    hap_device_get_info(def->device, &slot->info, sizeof slot->info);
+    slot->info = slot->effector->info;
   }
   slot_prepare(slot);
 }
@@ -445,6 +509,22 @@ static hap_status check_coupling(const hapi_haptic *haptic, const hapi_pointer_s
   return HAP_OK;
 }
 
+static hap_status device_take(const hapi_haptic *haptic, const hapi_pointer_setup *def,
+                              hap_detail *detail)
+{
+  hap_device *device = def->device;
+  uint32_t count = device != NULL ? device->effector_count : 1;
+  if (def->effector >= count) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "effector is %u: the device has %u, which count from 0", def->effector, count);
+  }
+  if (device == NULL || hapi_device_claim_effector(device, haptic, def->effector)) {
+    return HAP_OK;
+  }
+  return hapi_fail(detail, HAP_ERROR_STATE, "the device serves another pointer already%s",
+                   count > 1 ? " with this end effector, or one of another session" : "");
+}
+
 hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hapi_pointer_setup *def,
                                    hap_pointer_id *out, hap_detail *detail)
 {
@@ -458,9 +538,7 @@ hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hapi_pointer_setup
                      "all %u pointers of the session are in use; raise max_pointers",
                      haptic->config.capacity.pointers);
   }
-  if (def->device != NULL && !hapi_device_claim(def->device)) {
-    return hapi_fail(detail, HAP_ERROR_STATE, "the device serves another pointer already");
-  }
+  HAPI_TRY(device_take(haptic, def, detail));
   hapi_pointer_slot *slot = &haptic->slots[index];
   fill_slot(slot, def);
   hap_status status = check_coupling(haptic, slot, &slot->def, detail);
@@ -469,7 +547,7 @@ hap_status hapi_haptic_add_pointer(hapi_haptic *haptic, const hapi_pointer_setup
   }
   if (status < HAP_OK) {
     if (def->device != NULL) {
-      hapi_device_release(def->device);
+      hapi_device_release_effector(def->device, def->effector);
     }
     return status;
   }
@@ -512,7 +590,7 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
   }
   if (slot->def.device != NULL) {
     pthread_mutex_lock(&slot->lock); /* nobody is asking it to explain itself */
-    hapi_device_release(slot->def.device);
+    hapi_device_release_effector(slot->def.device, slot->def.effector);
     pthread_mutex_unlock(&slot->lock);
   }
   atomic_store(&slot->phase, HAPI_POINTER_EMPTY);
@@ -532,6 +610,39 @@ void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out
   pthread_mutex_unlock(&slot->lock);
 }
 
+static bool slot_has(const hapi_pointer_slot *slot, const hap_device *device)
+{
+  return atomic_load(&slot->phase) != HAPI_POINTER_EMPTY && slot->def.device == device;
+}
+
+/* All pointers of the device; false: the loop or the device does not come back. */
+static bool device_pause(hapi_haptic *haptic, const hap_device *device)
+{
+  bool gone = true;
+  for (uint32_t i = 0; gone && i < haptic->config.capacity.pointers; ++i) {
+    hapi_pointer_slot *slot = &haptic->slots[i];
+    if (slot_has(slot, device)) {
+      gone = leave_loop(haptic, slot, HAPI_POINTER_PAUSING) && stop_device(slot);
+    }
+  }
+  return gone;
+}
+
+static hap_status device_resume(hapi_haptic *haptic, const hap_device *device, hap_detail *detail)
+{
+  hap_status status = HAP_OK;
+  for (uint32_t i = 0; status >= HAP_OK && i < haptic->config.capacity.pointers; ++i) {
+    hapi_pointer_slot *slot = &haptic->slots[i];
+    if (slot_has(slot, device)) {
+      status = start_device(haptic, slot, detail);
+      if (status >= HAP_OK) {
+        atomic_store_explicit(&slot->phase, HAPI_POINTER_ADDED, memory_order_release);
+      }
+    }
+  }
+  return status;
+}
+
 /* Not in the loop's thread: start may block. */
 hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_detail *detail)
 {
@@ -544,17 +655,14 @@ hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, h
         detail, HAP_ERROR_STATE,
         slot->ops == NULL ? "the pointer has no device" : "the session is not started");
   }
-  if (!leave_loop(haptic, slot, HAPI_POINTER_PAUSING) || !stop_device(slot)) {
+  const hap_device *device = slot->def.device;
+  if (!device_pause(haptic, device)) {
     hap_detail where;
     hapi_haptic_where(haptic, &where);
     return hapi_fail(detail, HAP_ERROR_TIMEOUT, "the loop or the device has not come back: %.400s",
                      where.text);
   }
-  hap_status status = start_device(haptic, slot, detail);
-  if (status >= HAP_OK) {
-    atomic_store_explicit(&slot->phase, HAPI_POINTER_ADDED, memory_order_release);
-  }
-  return status;
+  return device_resume(haptic, device, detail);
 }
 
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,

@@ -40,7 +40,7 @@ hap_status hapi_standstill_watch(hapi_haptic *haptic, uint32_t index)
       .blocked = standstill_note,
       .tell = standstill_tell,
       .user = haptic};
-  return hapi_watchdog_start(&slot->watchdog, &def);
+  return hapi_watchdog_start(&slot->def.device->drive.watchdog, &def);
 }
 
 /* Index + 1 of the pointer in whose device the loop is; 0: in none. */

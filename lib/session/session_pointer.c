@@ -75,6 +75,7 @@ static hapi_pointer_setup setup_of(const hap_pointer_def *d, const hap_pointer_e
   setup.integration = r->integration;
   setup.virtual_mass = r->virtual_mass;
   setup.virtual_inertia = r->virtual_inertia;
+  setup.effector = d->effector;
   return setup;
 }
 
