@@ -6,6 +6,8 @@
 /* A world, a session in lockstep, and a hand without a device that is led. By the public headers
  * alone. Include after tap.h. */
 
+#include <time.h>
+
 #include "tests/ode_world.h"
 
 #define T 1e-3 /* s, of a tick */
@@ -86,6 +88,19 @@ static inline void desk_move(desk *d, double x, double y, double z, int ticks)
     }
     hand_lead(d);
     REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
+  }
+}
+
+/* In real time. */
+static inline void desk_glide(desk *d, double x, double y, double z)
+{
+  const double way[3] = {x, y, z};
+  for (int k = 0; k < 50; ++k) {
+    for (int i = 0; i < 3; ++i) {
+      d->at[i] += way[i] / 50.0;
+    }
+    hand_lead(d);
+    nanosleep(&(struct timespec){.tv_nsec = 4000000}, NULL);
   }
 }
 

@@ -23,6 +23,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "sound_on_touch": "docs/touches.md",
     "walk_and_reach": "docs/pointers.md",
     "own_device": "docs/writing-a-device.md",
+    "own_forces": "docs/forces.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -145,6 +146,15 @@ def check_walk_and_reach(program):
           "the hand rubs on the table", out)
     point(any(float(row[3]) == 0.0 for row in rows[7:10]), "with the clutch held there is no force",
           out)
+
+
+def check_own_forces(program):
+    rows = rows_of(run(program),
+                   r"^ *([0-9.]+) mm: +(-?[0-9.]+) N along, +(-?[0-9.]+) N to the rail$")
+    along = [abs(float(row[1])) for row in rows]
+    point(len(rows) == 20 and max(along[1:9]) <= 0.8 and max(along[12:]) > 0.8,
+          "the clicks get harder", str(rows))
+    point(all(-1.3 < float(row[2]) < -1.1 for row in rows[1:]), "the rail pulls", str(rows))
 
 
 def check_record_and_play(program):

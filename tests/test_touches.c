@@ -487,19 +487,6 @@ TEST(asking_changes_nothing)
   CHECK(hash_of_run(false) == hash_of_run(true));
 }
 
-/* In real time. */
-static void desk_glide(desk *d, double x, double y, double z)
-{
-  const double way[3] = {x, y, z};
-  for (int k = 0; k < 50; ++k) {
-    for (int i = 0; i < 3; ++i) {
-      d->at[i] += way[i] / 50.0;
-    }
-    hand_lead(d);
-    nanosleep(&(struct timespec){.tv_nsec = 4000000}, NULL);
-  }
-}
-
 static void stroke_world(desk *d)
 {
   floor_add(d);

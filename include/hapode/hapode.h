@@ -11,6 +11,7 @@
 #include <hapode/device.h>
 #include <hapode/effects.h>
 #include <hapode/expert.h>
+#include <hapode/forces.h>
 #include <hapode/hooks.h>
 #include <hapode/identify.h>
 #include <hapode/pointer.h>

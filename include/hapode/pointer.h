@@ -171,7 +171,8 @@ typedef enum hap_guard_flag {
   HAP_GUARD_FAULT = 32,        /* a fault is latched: on the way to zero, or there */
   HAP_GUARD_LATE = 64,         /* less force: ticks of the loop came late */
   HAP_GUARD_OSCILLATION = 128, /* less force: the device swings by itself, or seems to run away */
-  HAP_GUARD_INPUT = 256        /* the device is not believed, or no motion explains the force */
+  HAP_GUARD_INPUT = 256, /* the device is not believed, or no motion explains the force */
+  HAP_GUARD_OWN = 512    /* an own force was more than it promises and was shortened (forces.h) */
 } hap_guard_flag;
 
 /* A pointer in its last tick. It has a size and may grow at its end. */
@@ -194,6 +195,7 @@ typedef struct hap_pointer_state {
   /* N/m at the device, sum over the contacts near the pointer; 0 where contacts do not give
    * (GOD_OBJECT, VIRTUAL) */
   double contact_stiffness;
+  hap_wrench own; /* part of wrench that own forces and surfaces' vibrations have (forces.h) */
 } hap_pointer_state;
 
 /* [any] State after the newest tick. size_of_out: sizeof *out of the caller's build.

@@ -74,6 +74,14 @@
 #define HAPI_SAFETY_DEBT_AFTER_S 0.3     /* s */
 #define HAPI_SAFETY_DEBT_S 0.3           /* s */
 
+/* ---- what is declared beside contacts ---- */
+#define HAPI_SAFETY_POWER_S 0.1     /* s */
+#define HAPI_SAFETY_OWN_SPEED 1.0   /* m/s */
+#define HAPI_SAFETY_OWN_SPIN 10.0   /* rad/s */
+#define HAPI_SAFETY_OWN_SLIP 1e-4   /* m */
+#define HAPI_SAFETY_OWN_MASS 0.05   /* kg */
+#define HAPI_SAFETY_OWN_DAMPING 0.5 /* 1 */
+
 /* ---- a device that swings by itself, or runs away ---- */
 #define HAPI_SAFETY_SWING_LARGE 0.2      /* 1 */
 #define HAPI_SAFETY_SWING_LEAST_HZ 3.5   /* Hz */

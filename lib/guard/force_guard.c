@@ -215,10 +215,11 @@ static void pointer_want(const hapi_guard *guard, const hapi_tick_facts *facts, 
   hapi_guard_pointer *g = &p->guard;
   hapi_coupling_write(p);
   g->wanted = p->device.wrench;
+  g->flags = 0;
   if (p->declared.any) {
     hapi_wrench_add(&g->wanted, &p->declared.given);
+    g->flags = p->declared.held ? HAP_GUARD_OWN : 0;
   }
-  g->flags = 0;
   if (guard->latch.fault != HAP_FAULT_NONE) {
     bool fades = guard->latch.fault == HAP_FAULT_LATE;
     g->flags = HAP_GUARD_FAULT;
@@ -307,7 +308,6 @@ static void report_declared(hapi_pointer *p)
 /* What is reported is what the hand feels. */
 static void report_written(hapi_pointer *p)
 {
-  const double *q = p->device.pose_world_device.quat_wxyz;
   p->guard.written = p->guard.contact = p->device.wrench;
   if (p->device.three_dof || !p->device.feels_torque) {
     hapi_v3_set(p->wrench.torque, 0.0, 0.0, 0.0);
@@ -319,11 +319,7 @@ static void report_written(hapi_pointer *p)
     return;
   }
   if (p->device.force_scale > 0.0) {
-    hapi_quat_rotate(q, p->device.wrench.force, p->wrench.force);
-    hapi_v3_scale(1.0 / p->device.force_scale, p->wrench.force, p->wrench.force);
-    double scale = hapi_coupling_torque_scale(p);
-    hapi_quat_rotate(q, p->device.wrench.torque, p->wrench.torque);
-    hapi_v3_scale(scale > 0.0 ? 1.0 / scale : 0.0, p->wrench.torque, p->wrench.torque);
+    hapi_coupling_felt(p, &p->device.wrench, &p->wrench);
   } else if ((p->guard.flags & HAP_GUARD_FAULT) != 0) {
     memset(&p->wrench, 0, sizeof p->wrench); /* it may be not finite */
   }

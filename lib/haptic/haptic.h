@@ -15,6 +15,7 @@
 #include <hapode/touches.h>
 #include <hapode/trace.h>
 
+#include "base/force_setup.h"
 #include "base/pointer_setup.h"
 #include "record/tape.h"
 #include "sync/exchange.h"
@@ -86,6 +87,14 @@ bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id);
  * than grace_ns; HAP_ERROR_NOT_FOUND: also while no tick has had the pointer. */
 hap_status hapi_haptic_pointer_poses(hapi_haptic *haptic, hap_pointer_id id, int64_t time_ns,
                                      int64_t grace_ns, hap_pose out_proxy_device[2]);
+
+/* [any] forces.h. io: v 0: it is added, and its id comes back. HAP_SATURATED: something was cut to
+ * what the device can hold. */
+hap_status hapi_haptic_put_force(hapi_haptic *haptic, hap_pointer_id id, hap_force_id *io,
+                                 const hapi_force_setup *setup, const float *samples,
+                                 hap_detail *detail);
+hap_status hapi_haptic_remove_force(hapi_haptic *haptic, hap_pointer_id id, hap_force_id force,
+                                    hap_detail *detail);
 
 /* [any] touches.h: what was written, and HAP_STALE when nobody had asked before. */
 hap_status hapi_haptic_touches(hapi_haptic *haptic, hap_pointer_id id, hap_touch *touches,

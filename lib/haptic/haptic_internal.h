@@ -17,6 +17,7 @@
 #include "device/device.h"
 #include "device/watchdog.h"
 #include "haptic/haptic.h"
+#include "haptic/own_list.h"
 #include "haptic/settings_box.h"
 #include "record/tape.h"
 #include "sync/triple_buffer.h"
@@ -53,6 +54,7 @@ typedef struct hapi_pointer_slot {
   pthread_mutex_t lock; /* between applications that set, get, ask and remove */
   hapi_triple_buffer target_buffer;
   hapi_pointer_target targets[3];
+  hapi_own_list own;
   hapi_triple_buffer state_buffer;
   hap_pointer_state states[3];
   hapi_pointer_settings_box set;
@@ -276,6 +278,8 @@ hapi_device_limits hapi_pointer_limits(const hapi_pointer_slot *slot);
 void hapi_settings_follow(hapi_haptic *haptic, uint32_t index, int64_t now_ns);
 
 /* pointers.c: what the loop does with the slots */
+/* [any] With its lock taken; NULL: it is not there. */
+hapi_pointer_slot *hapi_slot_lock(hapi_haptic *haptic, hap_pointer_id id);
 void hapi_pointers_follow(hapi_haptic *haptic); /* phases */
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns);
 void hapi_pointers_write(hapi_haptic *haptic);

@@ -10,7 +10,7 @@
 #include "base/vec.h"
 #include "device/emergency.h"
 #include "guard/force_guard.h"
-#include "haptic/haptic_internal.h"
+#include "haptic/own_forces.h"
 #include "haptic/tick_memory.h"
 #include "tick/report.h"
 
@@ -68,6 +68,7 @@ void hapi_haptic_destroy(hapi_haptic *haptic)
   for (uint32_t i = 0; haptic->slots != NULL && i < haptic->config.capacity.pointers; ++i) {
     hap_pointer_id id = {((uint64_t)haptic->slots[i].generation << 32) | (i + 1)};
     (void)hapi_haptic_remove_pointer(haptic, id);
+    hapi_own_list_finish(&haptic->slots[i].own);
     pthread_mutex_destroy(&haptic->slots[i].lock);
   }
   hapi_told_destroy(haptic);
@@ -360,6 +361,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
     hapi_tape_tick(haptic, now_ns);
   }
   hapi_pointers_follow(haptic);
+  hapi_own_follow(haptic, now_ns);
   calls_follow(haptic);
   messages_receive(haptic, now_ns);
   hapi_pointers_read(haptic, now_ns);

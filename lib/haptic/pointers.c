@@ -12,7 +12,7 @@
 #include "device/emergency.h"
 #include "guard/force_guard.h"
 #include "haptic/coupling_gains.h"
-#include "haptic/haptic_internal.h"
+#include "haptic/own_forces.h"
 #include "pointer/coupling.h"
 #include "pointer/frame.h"
 #include "pointer/plausible.h"
@@ -58,6 +58,7 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   p->device.good.quat_wxyz[0] = 1.0;
   p->handle.quat[0] = p->proxy.quat[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
+  hapi_own_begin(haptic, index);
 }
 
 /* For a new user of the slot, whose def is in it. */
@@ -68,6 +69,7 @@ static void slot_prepare(hapi_pointer_slot *slot)
   atomic_store(&slot->generation, generation != 0 ? generation : 1u);
   hapi_triple_init(&slot->target_buffer);
   hapi_triple_init(&slot->state_buffer);
+  hapi_own_list_begin(&slot->own);
   memset(slot->targets, 0, sizeof slot->targets);
   memset(slot->states, 0, sizeof slot->states);
   for (int i = 0; i < 3; ++i) {
@@ -292,6 +294,14 @@ void hapi_pointers_write(hapi_haptic *haptic)
   }
 }
 
+/* On the hand, world. */
+static hap_wrench declared_felt(const hapi_pointer *p)
+{
+  hap_wrench felt;
+  hapi_coupling_felt(p, &p->declared.given, &felt);
+  return felt;
+}
+
 void hapi_pointers_publish(hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
@@ -317,6 +327,7 @@ void hapi_pointers_publish(hapi_haptic *haptic)
         .coupling_stiffness = p->proxied ? scale * p->coupling.stiffness : 0.0,
         .coupling_damping = p->proxied ? scale * p->coupling.damping : 0.0,
         .contact_stiffness = scale * p->coupling.contact_stiffness,
+        .own = p->declared.any ? declared_felt(p) : (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}},
     };
     hapi_triple_publish(&slot->state_buffer);
   }
@@ -451,7 +462,7 @@ bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id)
 }
 
 /* With its lock taken; NULL: it is not there, or it was removed in between. */
-static hapi_pointer_slot *slot_lock(hapi_haptic *haptic, hap_pointer_id id)
+hapi_pointer_slot *hapi_slot_lock(hapi_haptic *haptic, hap_pointer_id id)
 {
   hapi_pointer_slot *slot = find_slot(haptic, id);
   if (slot == NULL) {
@@ -599,7 +610,7 @@ hap_status hapi_haptic_remove_pointer(hapi_haptic *haptic, hap_pointer_id id)
 
 void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out)
 {
-  hapi_pointer_slot *slot = slot_lock(haptic, id);
+  hapi_pointer_slot *slot = hapi_slot_lock(haptic, id);
   out->text[0] = '\0';
   if (slot == NULL) {
     return;
@@ -669,7 +680,7 @@ hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const 
                                   const hap_twist *twist)
 {
   const hap_twist rest = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  hapi_pointer_slot *slot = slot_lock(haptic, id);
+  hapi_pointer_slot *slot = hapi_slot_lock(haptic, id);
   if (slot == NULL) {
     return HAP_ERROR_NOT_FOUND;
   }
@@ -686,7 +697,7 @@ hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const 
 hap_status hapi_haptic_set_pointer(hapi_haptic *haptic, hap_pointer_id id, hapi_setting_merge merge,
                                    const void *of, hap_detail *detail)
 {
-  hapi_pointer_slot *slot = slot_lock(haptic, id);
+  hapi_pointer_slot *slot = hapi_slot_lock(haptic, id);
   if (slot == NULL) {
     return HAP_ERROR_NOT_FOUND;
   }
@@ -713,7 +724,7 @@ hap_status hapi_haptic_set_pointer(hapi_haptic *haptic, hap_pointer_id id, hapi_
 hap_status hapi_haptic_get_settings(hapi_haptic *haptic, hap_pointer_id id,
                                     hapi_pointer_setting *out)
 {
-  hapi_pointer_slot *slot = slot_lock(haptic, id);
+  hapi_pointer_slot *slot = hapi_slot_lock(haptic, id);
   if (slot == NULL) {
     return HAP_ERROR_NOT_FOUND;
   }
@@ -724,7 +735,7 @@ hap_status hapi_haptic_get_settings(hapi_haptic *haptic, hap_pointer_id id,
 
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out)
 {
-  hapi_pointer_slot *slot = slot_lock(haptic, id);
+  hapi_pointer_slot *slot = hapi_slot_lock(haptic, id);
   if (slot == NULL) {
     return HAP_ERROR_NOT_FOUND;
   }

@@ -150,14 +150,16 @@ static bool input_is_plausible(const hapi_pointer *p)
           hapi_plausible(w, 3));
 }
 
-/* Over a jump nothing is known of the way. */
+/* Over a jump nothing is known of the way. A base that moves does not move the hand. */
 static void declared_begin(hapi_pointer *p, const hapi_pointer_handle *before, double elapsed)
 {
   double way[3] = {0.0, 0.0, 0.0};
   double turn[3] = {0.0, 0.0, 0.0};
   if (!p->device.jumped) {
     hapi_v3_sub(p->handle.position, before->position, way);
+    hapi_v3_sub(way, p->frame.step, way);
     hapi_v3_scale(elapsed, p->handle.spin, turn);
+    hapi_v3_sub(turn, p->frame.turned, turn);
   }
   hapi_declared_begin(&p->declared, way, turn);
 }
@@ -215,6 +217,17 @@ static void wrench_to_device(const hapi_pointer *p, const hap_wrench *world, hap
     to_device(p, world->torque, out->torque);
     hapi_v3_scale(torque_scale, out->torque, out->torque);
   }
+}
+
+void hapi_coupling_felt(const hapi_pointer *p, const hap_wrench *device, hap_wrench *out)
+{
+  const double *q = p->device.pose_world_device.quat_wxyz;
+  double torque_scale = hapi_coupling_torque_scale(p);
+  double force_scale = p->device.force_scale;
+  hapi_quat_rotate(q, device->force, out->force);
+  hapi_v3_scale(force_scale > 0.0 ? 1.0 / force_scale : 0.0, out->force, out->force);
+  hapi_quat_rotate(q, device->torque, out->torque);
+  hapi_v3_scale(torque_scale > 0.0 ? 1.0 / torque_scale : 0.0, out->torque, out->torque);
 }
 
 void hapi_coupling_write(hapi_pointer *p)

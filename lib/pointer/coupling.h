@@ -24,6 +24,9 @@ uint32_t hapi_coupling_read(const hapi_pointers *pointers, int64_t now_ns, doubl
 /* World wrench -> device wrench. */
 void hapi_coupling_write(hapi_pointer *pointer);
 
+/* What the hand feels of a device wrench, world frame and units; 0 where the scale is 0. */
+void hapi_coupling_felt(const hapi_pointer *pointer, const hap_wrench *device, hap_wrench *out);
+
 /* Device / world. */
 double hapi_coupling_torque_scale(const hapi_pointer *pointer);
 

@@ -18,8 +18,9 @@
 #include "base/vec.h"
 
 typedef struct hapi_declared {
-  bool any; /* in this tick */
-  bool was; /* in the tick before */
+  bool any;  /* in this tick */
+  bool was;  /* in the tick before */
+  bool held; /* some of it was more than was promised, and was shortened */
   /* Goes by where the hand is: springs, textures. The device may swing by it. */
   hap_wrench follows;
   double stiffness; /* N/m, at most: change of follows.force with the way */

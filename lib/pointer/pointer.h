@@ -249,6 +249,7 @@ typedef struct hapi_pointer {
   uint32_t contacts;   /* that push */
   bool proxied;        /* it is a proxy, of whatever coupling */
   bool rigid;          /* one whose contacts do not give: god-object and virtual tool */
+  bool own;            /* it has own forces: tick/own_forces.h */
   hap_pose pose;
   hap_twist twist;
   hap_wrench wrench; /* on the hand: of contacts; after the guard with what is declared */

@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/force_setup.h"
 #include "base/hash.h"
 #include "base/pace.h"
 #include "base/pointer_setup.h"
@@ -39,6 +40,9 @@ typedef enum hapi_cell_kind {
                             next one */
   HAPI_CELL_SET = 11,    /* before the POSE: HAPI_SET_CELLS of them, a hapi_pointer_setting; then
                             HULLs where it has a hull */
+  HAPI_CELL_OWN =
+      12, /* an own force is set: HAPI_OWN_CELLS of them, a hapi_force_setup; word: its place */
+  HAPI_CELL_SAMPLES = 13, /* behind the OWNs of a vibration that has them: floats */
   /* physics: WORLD, then CYCLE and CYCLED in turn, the one at the begin and the other at the end */
   HAPI_CELL_WORLD =
       16, /* hapi_world_word; flags: hap_model, and in the high byte the position of the dials + 1;
@@ -189,11 +193,20 @@ static_assert(sizeof(hapi_joined) <= HAPI_JOIN_CELLS * HAPI_CELL_BYTES, "room in
 static_assert(sizeof(hapi_pointer_setting) <= HAPI_SET_CELLS * HAPI_CELL_BYTES,
               "room in the cells");
 
-#define HAPI_HULL_CELLS(points) (((uint32_t)(points) + 1u) / 2u)
+#define HAPI_OWN_CELLS 5u
 
-/* Of a tick with everything in it; 64 vertices are the most. */
-#define HAPI_PACKET_MAX                                                                  \
-  (1u + 16u * (1u + HAPI_JOIN_CELLS + 2u * HAPI_HULL_CELLS(64u) + HAPI_SET_CELLS + 4u) + \
-   HAPI_CELL_BODIES)
+static_assert(sizeof(hapi_force_setup) <= HAPI_OWN_CELLS * HAPI_CELL_BYTES, "room in the cells");
+
+#define HAPI_HULL_CELLS(points) (((uint32_t)(points) + 1u) / 2u)
+#define HAPI_CELL_SAMPLE_COUNT 14u /* floats of a cell */
+#define HAPI_SAMPLES_CELLS(samples) \
+  (((uint32_t)(samples) + HAPI_CELL_SAMPLE_COUNT - 1u) / HAPI_CELL_SAMPLE_COUNT)
+
+/* Of a tick with everything in it; 64 vertices are the most, and one set of samples is taken. */
+#define HAPI_PACKET_MAX                                                       \
+  (1u +                                                                       \
+   16u * (1u + HAPI_JOIN_CELLS + 2u * HAPI_HULL_CELLS(64u) + HAPI_SET_CELLS + \
+          HAP_FORCES_MAX * HAPI_OWN_CELLS + 4u) +                             \
+   HAPI_SAMPLES_CELLS(HAP_FORCE_SAMPLES_MAX) + HAPI_CELL_BODIES)
 
 #endif

@@ -252,17 +252,10 @@ void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail)
 
 static void path_take_declared(const hapi_pointer *p, hap_wrench *io)
 {
-  const double *q = p->device.pose_world_device.quat_wxyz;
-  double scale = hapi_coupling_torque_scale(p);
-  hap_wrench given;
-  hapi_quat_rotate(q, p->declared.given.force, given.force);
-  hapi_quat_rotate(q, p->declared.given.torque, given.torque);
-  if (p->device.force_scale > 0.0) {
-    hapi_v3_madd(io->force, -1.0 / p->device.force_scale, given.force, io->force);
-  }
-  if (scale > 0.0) {
-    hapi_v3_madd(io->torque, -1.0 / scale, given.torque, io->torque);
-  }
+  hap_wrench felt;
+  hapi_coupling_felt(p, &p->declared.given, &felt);
+  hapi_v3_sub(io->force, felt.force, io->force);
+  hapi_v3_sub(io->torque, felt.torque, io->torque);
 }
 
 void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path)

@@ -29,6 +29,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
   const hapi_tick_array all[HAPI_TICK_ARRAYS] = {
       {&tick->pointers.of, c->pointers, sizeof *tick->pointers.of, true},
       {&tick->pointers.hulls, c->pointers, sizeof *tick->pointers.hulls, true},
+      ARRAY(own, (size_t)HAP_FORCES_MAX * c->pointers),
       ARRAY(bodies.of, c->bodies),
       ARRAY(bodies.courses, c->bodies),
       ARRAY(bodies.live, c->bodies),
@@ -157,10 +158,27 @@ void hapi_tick_guard(hapi_tick *tick)
   hapi_guard_write(&tick->guard, tick->facts.period, &tick->pointers);
 }
 
-void hapi_tick_run(hapi_tick *tick, int64_t now_ns)
+static void own_forces(hapi_tick *tick)
 {
-  hapi_tick_read(tick, now_ns);
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    hapi_own_force *own = &tick->own[(size_t)i * HAP_FORCES_MAX];
+    if (!p->own || p->generation == 0) {
+      continue;
+    }
+    if (tick->facts.faulted) {
+      hapi_own_forces_rest(own);
+    } else {
+      hapi_own_forces_declare(own, p, tick->facts.now_ns, tick->facts.period);
+    }
+    p->own = hapi_own_forces_any(own);
+  }
+}
+
+void hapi_tick_answer(hapi_tick *tick)
+{
   tick->facts.faulted = tick->guard.latch.fault != HAP_FAULT_NONE;
+  own_forces(tick);
   tick->bodies.unsound = false;
   tick->bodies.given = 0.0;
   if (tick->facts.model == HAP_MODEL_CONTACT) {
@@ -173,4 +191,10 @@ void hapi_tick_run(hapi_tick *tick, int64_t now_ns)
     tick->hash = hapi_tick_hash(tick, tick->hash);
   }
   ++tick->facts.tick;
+}
+
+void hapi_tick_run(hapi_tick *tick, int64_t now_ns)
+{
+  hapi_tick_read(tick, now_ns);
+  hapi_tick_answer(tick);
 }

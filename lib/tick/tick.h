@@ -31,6 +31,7 @@
 #include "local/touch.h"
 #include "pointer/pointer.h"
 #include "sync/messages.h"
+#include "tick/own_forces.h"
 
 /* What the trace shows besides the pointers. */
 typedef struct hapi_tick_watch {
@@ -43,6 +44,7 @@ typedef struct hapi_tick {
   hapi_capacity capacity;
   hapi_tick_facts facts;
   hapi_pointers pointers;
+  hapi_own_force *own; /* HAP_FORCES_MAX of each pointer */
   hapi_bodies bodies;
   hapi_touches touches;
   hapi_body_contacts contacts;
@@ -63,7 +65,7 @@ typedef struct hapi_tick_array {
   bool stays;  /* hapi_tick_reset does not touch it */
 } hapi_tick_array;
 
-#define HAPI_TICK_ARRAYS 24
+#define HAPI_TICK_ARRAYS 25
 
 /* All of them; the capacity, and that of rows, buckets and work, are set. */
 void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS]);
@@ -77,7 +79,8 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns);
 /* The set stays in use, and must stay as it is, until the next call. */
 void hapi_tick_adopt_patches(hapi_tick *tick, hapi_patches *patches);
 
-/* One tick at now_ns, from the pose and twist of the pointers' devices to their wrench. */
+/* One tick at now_ns, from the pose and twist of the pointers' devices to their wrench: read, and
+ * what follows on it. */
 void hapi_tick_run(hapi_tick *tick, int64_t now_ns);
 
 /* Latches the first one. pointer: index + 1 of the one that it came from; 0: none of them. */
@@ -87,6 +90,7 @@ void hapi_tick_reset_fault(hapi_tick *tick);
 /* ---- parts of hapi_tick_run ---- */
 
 void hapi_tick_read(hapi_tick *tick, int64_t now_ns); /* devices -> pointers */
+void hapi_tick_answer(hapi_tick *tick);               /* pointers -> devices */
 void hapi_contact_step(hapi_tick *tick);              /* model CONTACT */
 void hapi_tick_guard(hapi_tick *tick);                /* world wrenches -> device wrenches */
 

@@ -1,0 +1,136 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_FORCES_H
+#define HAPODE_FORCES_H
+
+/* Forces of the application's own, on a hand, at the haptic rate (docs/forces.md). */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hapode/attributes.h>
+#include <hapode/pointer.h>
+#include <hapode/session.h>
+#include <hapode/status.h>
+
+HAP_BEGIN_DECLS
+
+/* What an own force does. Values are never renumbered. */
+typedef enum hap_force_kind {
+  HAP_FORCE_CONSTANT = 1, /* force and torque */
+  HAP_FORCE_SPRING = 2,   /* -stiffness x way from the target, -damping x velocity on that way */
+  HAP_FORCE_VISCOUS = 3,  /* -damping x velocity */
+  HAP_FORCE_WEIGHT = 4,   /* mass x gravity, which acts at point: the weight of a tool */
+  HAP_FORCE_MAGNET = 5,   /* pulls to the target, from within range on */
+  HAP_FORCE_DETENTS = 6,  /* pulls to the nearest of places that are pitch apart, along axis */
+  HAP_FORCE_VIBRATION = 7 /* along axis, by time */
+} hap_force_kind;
+
+/* Whose axes and origin are meant. Values are never renumbered. */
+typedef enum hap_force_frame {
+  HAP_FORCE_WORLD = 0,
+  HAP_FORCE_POINTER = 1 /* the axes of the hand: CONSTANT and VIBRATION turn with it */
+} hap_force_frame;
+
+/* What SPRING, VISCOUS and MAGNET go by: the way to a point, or of a line or a plane the part of it
+ * across the line or along the plane's normal. VISCOUS uses the velocity alike. Values are never
+ * renumbered. */
+typedef enum hap_force_target {
+  HAP_FORCE_POINT = 0, /* origin */
+  HAP_FORCE_LINE = 1,  /* through origin, along axis */
+  HAP_FORCE_PLANE = 2  /* through origin, axis is its normal */
+} hap_force_target;
+
+/* How a vibration goes in time. Final. */
+typedef struct hap_force_wave {
+  double hz;       /* Hz, up to 0.45 of haptic_hz, default 100: of the sine that begins at 0 */
+  double attack_s; /* s, 0..3600, default 0: from nothing to strength, linearly */
+  double hold_s;   /* s, 0..3600, or HAP_FORCE_FOR_EVER (default) */
+  double decay_s;  /* s, 0..3600, default 0: back to nothing, linearly */
+  /* In place of the sine: values of -1..1, which are copied, played at sample_hz again and again,
+   * and joined by straight lines. NULL (default): the sine. */
+  const float *samples;
+  uint32_t sample_count; /* 2..HAP_FORCE_SAMPLES_MAX; 0 (default) without samples */
+  uint32_t restart;      /* where set gives another number than before, it begins anew */
+  double sample_hz;      /* Hz, 1e-3..1e6, default 1000 */
+} hap_force_wave;
+
+#define HAP_FORCE_FOR_EVER 1e9
+#define HAP_FORCE_SAMPLES_MAX 1024 /* of a vibration */
+#define HAP_FORCES_MAX 16          /* of a pointer */
+
+/* An own force of a pointer. World frame and units: as the force of contacts it is multiplied by
+ * force_scale on its way to the device. It has a size and may grow at its end. */
+typedef struct hap_force_def {
+  uint32_t size;   /* set by hap_force_def_init */
+  uint32_t cookie; /* set by hap_force_def_init */
+  uint32_t kind;   /* hap_force_kind; 0 (default) is none */
+  uint32_t frame;  /* hap_force_frame, default HAP_FORCE_WORLD */
+  uint32_t target; /* hap_force_target, default HAP_FORCE_POINT */
+  uint32_t reserved;
+  double origin[3]; /* m, default 0: the point, or a point of the line, the plane, the detents */
+  double axis[3];   /* any length but 0, default 0 0 1 */
+  double point[3];  /* m, pointer's frame, default 0: where on the pointer it acts */
+
+  double force[3];   /* N, CONSTANT */
+  double torque[3];  /* N m, CONSTANT */
+  double stiffness;  /* N/m, 0..1e9, SPRING. What the device cannot hold is cut: HAP_SATURATED */
+  double damping;    /* N s/m, 0..1e6, SPRING and VISCOUS; cut likewise */
+  double mass;       /* kg, 0..1e3, WEIGHT */
+  double gravity[3]; /* m/s^2, default 0 0 -9.81, WEIGHT */
+  double strength;   /* N, 0..1e6, the largest force of MAGNET, DETENTS and VIBRATION */
+  double range;      /* m, 1e-4..100, default 0.02, MAGNET: no force from there on */
+  double pitch;      /* m, 1e-5..100, default 0.005, DETENTS */
+  hap_force_wave vibration;
+
+  double fade_in_s; /* s, 0..60, default 0.02: after add the force comes in linearly */
+  /* What it promises; the guard holds it to that. 0 (default): what the fields above come to. Of
+   * SPRING and VISCOUS that is the max_force of the pointer. */
+  double max_force;  /* N, 0..1e6 */
+  double max_torque; /* N m, 0..1e6 */
+  /* W, 0..1e6: energy that it gives to the hand, as a mean over 0.1 s. HAP_FORCE_POWER_AUTO
+   * (default): 0 for VISCOUS, which takes energy alone; for others the largest force at 1 m/s. */
+  double max_power;
+} hap_force_def;
+
+#define HAP_FORCE_POWER_AUTO (-1.0)
+
+/* Index and serial number in one: the id of a removed force is never valid again. 0 is none.
+ * Final. */
+typedef struct hap_force_id {
+  uint64_t v; /* only to be compared with that of another id */
+} hap_force_id;
+
+/* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
+HAP_API void hap_force_def_init(hap_force_def *def, size_t size_of_def);
+
+/* [any] Adds a force to what the pointer's hand feels, before start or from the next tick on. A
+ * proxy does not feel it: it acts on the hand. It stays until it is removed, also over
+ * hap_session_stop. No force acts while a fault is latched.
+ *
+ * HAP_SATURATED, and it is added: stiffness or damping was above what the device can hold and was
+ * cut; hap_session_detail has the number. HAP_ERROR_ARGUMENT, and hap_session_detail names the
+ * field. HAP_ERROR_CAPACITY: HAP_FORCES_MAX. HAP_ERROR_NOT_FOUND: no such pointer.
+ * HAP_ERROR_UNINITIALISED: def did not go through hap_force_def_init. HAP_ERROR_STATE: the session
+ * plays a recording, which has its own. HAP_ERROR_MEMORY: none for the samples. */
+HAP_NODISCARD HAP_API hap_status hap_pointer_force_add(hap_session *session, hap_pointer_id pointer,
+                                                       const hap_force_def *def, hap_force_id *out);
+
+/* [any] Gives it other values, also another kind, from the next tick on. The force does not leap:
+ * the difference goes away in 20 ms. A vibration goes on in time unless restart has changed. Errors
+ * as of hap_pointer_force_add, and then nothing changes. HAP_ERROR_NOT_FOUND: or no such force. */
+HAP_NODISCARD HAP_API hap_status hap_pointer_force_set(hap_session *session, hap_pointer_id pointer,
+                                                       hap_force_id force,
+                                                       const hap_force_def *def);
+
+/* [any] It goes away in 20 ms, and its id is invalid at once. HAP_ERROR_NOT_FOUND: no such pointer
+ * or force. HAP_ERROR_STATE: the session plays a recording. */
+HAP_API hap_status hap_pointer_force_remove(hap_session *session, hap_pointer_id pointer,
+                                            hap_force_id force);
+
+/* [any] Name of a kind as programs spell it ("magnet"); NULL for an unknown value. */
+HAP_API const char *hap_force_kind_name(hap_force_kind kind);
+
+HAP_END_DECLS
+
+#endif

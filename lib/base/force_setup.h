@@ -1,0 +1,47 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BASE_FORCE_SETUP_H
+#define HAPODE_BASE_FORCE_SETUP_H
+
+#include <stdint.h>
+
+#include <hapode/forces.h>
+
+typedef struct hapi_wave_setup {
+  uint32_t restart;
+  uint32_t sample_count; /* 0: a sine */
+  double hz;
+  double attack_s;
+  double hold_s;
+  double decay_s;
+  double sample_hz;
+} hapi_wave_setup;
+
+/* An own force as the tick has it: a hap_force_def, checked, with its promises filled in. Units and
+ * ranges are those of the API. Recordings hold it: a member that moves needs another version of the
+ * file. */
+typedef struct hapi_force_setup {
+  uint32_t kind;   /* hap_force_kind */
+  uint32_t frame;  /* hap_force_frame */
+  uint32_t target; /* hap_force_target */
+  uint32_t serial; /* of the force, of all that the pointer has had; 0: none is here */
+  uint32_t number; /* of the setting, of all that the pointer's forces have had */
+  uint32_t reserved;
+  double origin[3];
+  double axis[3]; /* unit */
+  double point[3];
+  double force[3]; /* of WEIGHT too */
+  double torque[3];
+  double stiffness; /* that the device can hold, as the next */
+  double damping;
+  double strength;
+  double range;
+  double pitch;
+  hapi_wave_setup wave;
+  double fade_in_s;
+  double max_force;
+  double max_torque;
+  double max_power;
+} hapi_force_setup;
+
+#endif

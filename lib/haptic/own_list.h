@@ -1,0 +1,58 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_HAPTIC_OWN_LIST_H
+#define HAPODE_HAPTIC_OWN_LIST_H
+
+/* The own forces that the application wants a pointer to have, on their way to the loop: the whole
+ * list at each change, by a triple buffer. Samples of vibrations stay where they are until the loop
+ * has taken a list without them. */
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <hapode/status.h>
+
+#include "base/force_setup.h"
+#include "sync/triple_buffer.h"
+
+typedef struct hapi_own_wave hapi_own_wave;
+
+/* setup.serial 0: no force is in this place. */
+typedef struct hapi_own_message {
+  uint64_t number; /* 1, 2, 3 ... */
+  hapi_force_setup setups[HAP_FORCES_MAX];
+  const float *samples[HAP_FORCES_MAX];
+} hapi_own_message;
+
+/* Zeroed: no force. */
+typedef struct hapi_own_list {
+  hapi_triple_buffer buffer;
+  hapi_own_message messages[3];
+  _Atomic uint64_t taken; /* message that the loop has in use */
+
+  /* The loop's. */
+  bool partly; /* a message was taken, and not all of it is in use */
+
+  /* The application's, under the lock of the pointer's slot. */
+  hapi_own_message wanted;
+  hapi_own_wave *waves;
+  uint32_t serials; /* so far */
+  uint32_t numbers;
+} hapi_own_list;
+
+void hapi_own_list_begin(hapi_own_list *list);  /* a new pointer, which the loop does not have */
+void hapi_own_list_finish(hapi_own_list *list); /* idempotent */
+
+/* [application, locked] io: of the force whose place the setup takes; v 0: it is added. samples:
+ * copied, NULL for a sine. HAP_ERROR_CAPACITY, HAP_ERROR_NOT_FOUND, HAP_ERROR_MEMORY. */
+HAP_NODISCARD hap_status hapi_own_list_put(hapi_own_list *list, hap_force_id *io,
+                                           const hapi_force_setup *setup, const float *samples);
+HAP_NODISCARD hap_status hapi_own_list_remove(hapi_own_list *list, hap_force_id force);
+
+/* [replay] Room for samples that come from the tape; NULL: no memory. Given back where no force
+ * uses them any more. */
+float *hapi_own_list_room(hapi_own_list *list, uint32_t count);
+void hapi_own_list_give_back(hapi_own_list *list, const float *samples);
+
+#endif

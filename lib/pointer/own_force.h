@@ -1,0 +1,24 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_POINTER_OWN_FORCE_H
+#define HAPODE_POINTER_OWN_FORCE_H
+
+/* What an own force is at a place, a velocity and a time. */
+
+#include <stdbool.h>
+
+#include "base/force_setup.h"
+#include "pointer/pointer.h"
+
+/* World frame, on the hand, about the pointer's origin; within what is promised. seconds: since it
+ * began. samples: of the setup, NULL for a sine. */
+void hapi_own_force_value(const hapi_force_setup *setup, const float *samples,
+                          const hapi_pointer *pointer, double seconds, hap_wrench *out);
+
+/* Whether it goes by where the hand is, and not by time alone. */
+bool hapi_own_force_follows(const hapi_force_setup *setup);
+
+/* N/m, the most that a way can change it. */
+double hapi_own_force_stiffness(const hapi_force_setup *setup);
+
+#endif

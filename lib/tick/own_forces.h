@@ -1,0 +1,46 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TICK_OWN_FORCES_H
+#define HAPODE_TICK_OWN_FORCES_H
+
+/* The own forces of the pointers: how they come, change and go. */
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "base/force_setup.h"
+#include "guard/promise.h"
+#include "pointer/pointer.h"
+
+/* One of a pointer. Zeroed: no force is here. */
+typedef struct hapi_own_force {
+  hapi_force_setup setup;
+  const float *samples; /* NULL: a sine */
+  bool leaves;          /* removed: on the way to nothing */
+  bool changed;         /* since the last tick */
+  int64_t begin_ns;     /* of a vibration */
+  double share;         /* 0..1, of the fade-in */
+  hap_wrench gives;     /* in the last tick */
+  /* What a change would make leap, and how much of it is left, 0..1. */
+  hap_wrench offset;
+  double offset_left;
+  hapi_promise before; /* what it gave when it was changed */
+  hapi_purse purse;
+} hapi_own_force;
+
+/* Between ticks: from the next one on this setup is in force. One of another serial is another
+ * force. serial 0: the force leaves. */
+void hapi_own_force_change(hapi_own_force *own, const hapi_force_setup *setup, const float *samples,
+                           int64_t now_ns);
+
+/* Once a tick, after the devices were read: adds the forces of a pointer to what is declared.
+ * forces: HAP_FORCES_MAX. */
+void hapi_own_forces_declare(hapi_own_force *forces, hapi_pointer *pointer, int64_t now_ns,
+                             double seconds);
+
+/* In place of it while a fault is latched: no force acts, and what was removed is gone. */
+void hapi_own_forces_rest(hapi_own_force *forces);
+
+bool hapi_own_forces_any(const hapi_own_force *forces);
+
+#endif
