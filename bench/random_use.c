@@ -1257,11 +1257,14 @@ static bool use_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io
   return true;
 }
 
-static void use_pointer_surface(void *user, hap_pointer_id pointer, dGeomID geom, double *io_mu)
+static void use_pointer_surface(void *user, hap_pointer_id pointer, dGeomID geom, hap_surface *io)
 {
   (void)user;
   (void)pointer;
-  *io_mu = 0.2 * (dGeomGetClass(geom) % 4);
+  int kind = dGeomGetClass(geom) % 4;
+  io->friction_dynamic = 0.2 * kind;
+  io->friction_static = 0.25 * kind;
+  io->stiffness *= 1.0 + 0.5 * kind;
 }
 
 static void use_before_step(void *user, double step_s)

@@ -24,6 +24,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "walk_and_reach": "docs/pointers.md",
     "own_device": "docs/writing-a-device.md",
     "own_forces": "docs/forces.md",
+    "sandpaper_and_ice": "docs/surfaces.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -146,6 +147,16 @@ def check_walk_and_reach(program):
           "the hand rubs on the table", out)
     point(any(float(row[3]) == 0.0 for row in rows[7:10]), "with the clutch held there is no force",
           out)
+
+
+def check_sandpaper_and_ice(program):
+    rows = rows_of(run(program), r"^ *\S+ mm: (\w+) +presses with ([0-9.]+) N, "
+                                 r"rubs with (-?[0-9.]+) N$")
+    rubs = {name: max(float(f) for n, _, f in rows if n == name)
+            for name in ("ice", "sandpaper", "foam")}
+    point(rubs["sandpaper"] > 10 * rubs["ice"] > 10 * rubs["foam"], "sandpaper rubs", str(rubs))
+    last = float(rows[-1][1]) if rows else 0.0
+    point(0.5 < last < 1.0, "foam is soft", f"{last} N")
 
 
 def check_own_forces(program):

@@ -25,14 +25,16 @@ static struct {
   bool keeps; /* says what it came with */
 } asked;
 
-static void pointer_surface(void *user, hap_pointer_id pointer, dGeomID geom, double *io_mu)
+static void pointer_surface(void *user, hap_pointer_id pointer, dGeomID geom, hap_surface *io)
 {
   (void)user;
   asked.pointer = pointer;
   asked.geom = geom;
-  asked.came_with = *io_mu;
+  asked.came_with = io->friction_dynamic;
   ++asked.calls;
-  *io_mu = asked.keeps ? *io_mu : asked.says;
+  if (!asked.keeps) {
+    io->friction_static = io->friction_dynamic = asked.says;
+  }
 }
 
 static contact_world *open_world(hap_model model)
@@ -46,6 +48,14 @@ static contact_world *open_world(hap_model model)
   w->hand_def.damping = 0.0;
   w->hand_def.friction = 0.3;
   return w;
+}
+
+static void surface_says(contact_world *w, double mu)
+{
+  asked.says = mu;
+  CHECK(hap_session_lock(w->session) == HAP_OK);
+  CHECK(hap_session_surface_changed(w->session, dBodyGetFirstGeom(w->bodies[0])) == HAP_OK);
+  hap_session_unlock(w->session);
 }
 
 /* Pressed 2 mm into a cube of 1000 kg, 4 N, and then pulled by a way along x. */
@@ -71,19 +81,20 @@ TEST(the_callback_says_the_friction_of_a_geom)
     CHECK(asked.calls > 0 && asked.came_with == 0.3 && asked.pointer.v == w->hand.v);
     CHECK(asked.geom == dBodyGetFirstGeom(w->bodies[0]));
     CHECK_NEAR(w->force[0], -0.1 * w->force[2], 1e-3 * w->force[2]);
-    asked.says = 0.5; /* more of it holds what it holds */
+    surface_says(w, 0.5); /* more of it holds what it holds */
     cw_run(w, 60);
     CHECK_NEAR(w->force[0], -0.1 * w->force[2], 1e-3 * w->force[2]);
-    asked.says = 0.05; /* less of it slides */
+    surface_says(w, 0.05); /* less of it slides */
     cw_run(w, 60);
     CHECK_NEAR(w->force[0], -0.05 * w->force[2], 1e-3 * w->force[2]);
-    asked.says = 0.0;
+    surface_says(w, 0.0);
     cw_run(w, 60);
     CHECK_NEAR(w->force[0], 0.0, 1e-6); /* the cube tilts by as little */
-    asked.says = 0.5;                   /* and begins anew */
+    surface_says(w, 0.5);               /* and begins anew */
     cw_run(w, 60);
     CHECK_NEAR(w->force[0], 0.0, 1e-6);
     asked.keeps = true;
+    surface_says(w, 0.5);
     cw_go(w, 0.05, 0.0, 0.0, 100);
     CHECK_NEAR(w->force[0], -0.3 * w->force[2], 2e-3 * w->force[2]);
   }
@@ -118,14 +129,14 @@ TEST(a_friction_that_is_none_is_a_fault_with_a_text)
     asked.says = 0.2;
     cube_pull(w, 0.002);
     CHECK(cw_stats(w).faults.fault == HAP_FAULT_NONE && w->force[0] < -0.5);
-    asked.says = wrong[i];
+    surface_says(w, wrong[i]);
     run_faulty(w, 20);
     CHECK(cw_stats(w).faults.fault == HAP_FAULT_WORLD);
     CHECK(hap_session_detail(w->session, &detail) == HAP_OK);
     CHECK(strstr(detail.text, "pointer_surface") != NULL);
     run_faulty(w, 200);
     CHECK(cw_norm(w->force) == 0.0);
-    asked.says = 0.2;
+    asked.says = 0.2; /* no call: after an answer that was none it is asked anyway */
     run_faulty(w, 20);
     CHECK(hap_session_reset_fault(w->session) == HAP_OK);
     cw_run(w, 100);

@@ -382,6 +382,36 @@ TEST(sixteen_hands_and_bodies_that_callbacks_exchange)
   CHECK(again.stats.faults.bodies_lost == before.faults.bodies_lost);
 }
 
+static void cube_surface(void *user, hap_pointer_id pointer, dGeomID geom, hap_surface *io)
+{
+  (void)user;
+  (void)pointer;
+  if (dGeomGetBody(geom) != NULL) {
+    io->stiffness = 2500.0;
+    io->damping = 1.0;
+    io->friction_static = 0.9;
+    io->friction_dynamic = 0.4;
+  }
+}
+
+TEST(surfaces_of_their_own)
+{
+  small_world w;
+  build_world(&w);
+  w.ode.pointer_surface = cube_surface;
+  start_recording(&w, 3);
+  sleep_ms(500);
+  hap_stats before = stop_recording(&w);
+  CHECK(before.loop.contact_ticks > 10);
+  build_world(&w);
+  w.ode.pointer_surface = cube_surface;
+  replay again = play_in(&w);
+  check_alike(&again, &before);
+  build_world(&w); /* where nobody says so, it is another session */
+  again = play_in(&w);
+  CHECK(again.difference.what != HAP_DIFFERENCE_NONE);
+}
+
 static void push_cube(void *arg)
 {
   dBodyAddForce(arg, -300.0, 0.0, 0.0);

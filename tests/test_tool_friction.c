@@ -387,13 +387,20 @@ static struct {
   int calls;
 } asked;
 
-static void pointer_surface(void *user, hap_pointer_id pointer, dGeomID geom, double *io_mu)
+static void pointer_surface(void *user, hap_pointer_id pointer, dGeomID geom, hap_surface *io)
 {
   (void)user;
   (void)pointer;
-  asked.came_with = *io_mu;
+  asked.came_with = io->friction_static;
   ++asked.calls;
-  *io_mu = asked.says[geom == asked.left ? 0 : 1];
+  io->friction_static = io->friction_dynamic = asked.says[geom == asked.left ? 0 : 1];
+}
+
+static void surfaces_change(tool_world *w)
+{
+  CHECK(hap_session_lock(w->session) == HAP_OK);
+  CHECK(hap_session_surface_changed(w->session, NULL) == HAP_OK);
+  hap_session_unlock(w->session);
 }
 
 /* Across two boxes of which each has a friction of its own: the sum of both, and the moment
@@ -418,9 +425,11 @@ TEST(each_geom_has_its_friction)
     CHECK_NEAR(w->state.wrench.torque[2], -0.6 * LOAD * 0.0055,
                2e-3 * LOAD * HALF); /* 1 to 10 mm */
     asked.says[0] = asked.says[1] = 0.1;
+    surfaces_change(w);
     tool_run(w, 60);
     CHECK_NEAR(w->state.wrench.force[1], -0.2 * LOAD, 2e-3 * LOAD);
     asked.says[0] = asked.says[1] = 0.0;
+    surfaces_change(w);
     tool_run(w, 60);
     CHECK_NEAR(slip_of(w), 0.0, 1e-9);
     tool_end(w);

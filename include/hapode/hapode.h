@@ -22,6 +22,7 @@
 #include <hapode/spatial.h>
 #include <hapode/stats.h>
 #include <hapode/status.h>
+#include <hapode/surface.h>
 #include <hapode/touches.h>
 #include <hapode/trace.h>
 #include <hapode/version.h>

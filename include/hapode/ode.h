@@ -17,6 +17,7 @@
 #include <hapode/session.h>
 #include <hapode/spatial.h>
 #include <hapode/status.h>
+#include <hapode/surface.h>
 #include <hapode/touches.h>
 
 #ifndef dDOUBLE
@@ -36,12 +37,13 @@ typedef bool (*hap_surface_fn)(void *user, dGeomID a, dGeomID b, dSurfaceParamet
  * dContactFDir1. The part across each contact's normal is used. False: ODE's own direction. */
 typedef bool (*hap_direction_fn)(void *user, dGeomID a, dGeomID b, double out_direction[3]);
 
-/* [physics] The friction of a pointer against a geom: *io_mu arrives with hap_pointer_def.friction.
- * 0: none; above 10 is taken as 10 (84 degrees). Called once a step for each geom near the pointer,
- * after the step and never in testing simulations. A number that is not finite or below 0 is
- * HAP_FAULT_WORLD, and no friction. A change is felt from the next step on. */
+/* [physics] How a pointer feels a geom: *io comes with what the pointer has of its own. Called
+ * once, when the geom comes near the pointer, and again after hap_session_surface_changed or when
+ * the geom has been away; never in testing simulations. A geom whose category bits do not meet the
+ * pointer's collide bits is not felt and not asked about. A number that is not finite or out of
+ * range is HAP_FAULT_WORLD; the geom is not felt, and asked about again at the next step. */
 typedef void (*hap_pointer_surface_fn)(void *user, hap_pointer_id pointer, dGeomID geom,
-                                       double *io_mu);
+                                       hap_surface *io);
 
 /* [physics] Before a global step: apply forces. After it: read results, and set velocities of
  * kinematic bodies and motors of joints for the step to come. Near a hand they act from then on in
@@ -92,7 +94,7 @@ typedef struct hap_ode_def {
   void *user;                             /* handed to all callbacks; the caller's */
   int32_t max_contacts_per_pair;          /* 1..64, default 8; the loop keeps at most 4 */
   hap_direction_fn friction_direction;    /* may be NULL */
-  hap_pointer_surface_fn pointer_surface; /* NULL: the pointer's own friction against everything */
+  hap_pointer_surface_fn pointer_surface; /* NULL: everything is felt as the pointers say */
   /* 1..64, default 1: threads that step islands of the world at once. More than 1: the world has a
    * pool of ODE's threads while the session runs, and ODE's default at stop, whatever
    * dWorldSetStepThreadingImplementation had set. They have the priority of the thread that starts
@@ -145,6 +147,11 @@ HAP_API hap_status hap_session_teleport_body(hap_session *session, dBodyID body,
  * mesh's triangles. Without it the next step notices the first. Of the second it notices only what
  * shows in 16 triangles spread over the mesh. */
 HAP_API hap_status hap_session_forget_geom(hap_session *session, dGeomID geom);
+
+/* [locked, or control before start] The surface of a geom has changed, of all if geom is NULL:
+ * pointer_surface is asked again at the next step for the pointers near it. In a contact that
+ * presses, another stiffness comes in over 20 ms. */
+HAP_API hap_status hap_session_surface_changed(hap_session *session, dGeomID geom);
 
 /* [locked, or control before start] Sets a body's moved callback (NULL: none). ODE has no getter
  * for it, so the session can keep one silent in testing simulations only when it was set here.

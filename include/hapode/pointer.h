@@ -30,8 +30,9 @@ typedef struct hap_pointer_def {
   uint32_t size;   /* set by hap_pointer_def_init */
   uint32_t cookie; /* set by hap_pointer_def_init */
 
-  /* Borrowed, one pointer for each of its end effectors, all of one session. NULL (default): hap_pointer_set_target moves the
-   * pointer, and it is not in the world before its first target. */
+  /* Borrowed, one pointer for each of its end effectors, all of one session. NULL (default):
+   * hap_pointer_set_target moves the pointer, and it is not in the world before its first
+   * target. */
   hap_device *device;
   hap_pose pose_world_device; /* of the device's frame in the world, default identity */
   double motion_scale;        /* world metres for a device metre, 1e-6..1e6, default 1 */
@@ -55,7 +56,7 @@ typedef struct hap_pointer_def {
   double stiffness;
   double damping; /* N s/m, 0..1e6, default 0: d of eq. 7, acts in contact; shared likewise */
   /* 0..10, default 0: Coulomb friction against what the pointer touches, sticking and sliding.
-   * hap_ode_def.pointer_surface gives another value for a geom. Each point of a hull that touches
+   * hap_ode_def.pointer_surface gives other values for a geom. Each point of a hull that touches
    * has its own share, so that a face also holds against turning
    * (docs/decisions/friction.md). */
   double friction;

@@ -490,9 +490,9 @@ void hapi_lookback_note(hapi_lookback *w)
                                        .pointer = slot->pointer,
                                        .generation = slot->pointer_generation,
                                        .is_tool = slot->is_tool,
-                                       .mu = slot->mu};
+                                       .mu = slot->said.mu};
     if (slot->phase == HAPI_SLOT_LIVE) {
-      w->spoilt = w->spoilt || geom_is_carried(w, slot->geom);
+      w->spoilt = w->spoilt || slot->said.feel != 0 || geom_is_carried(w, slot->geom);
       window_note_touch(w, w->cycle->config->capacity.contacts, &touch);
     }
   }
@@ -507,6 +507,7 @@ void hapi_lookback_note(hapi_lookback *w)
                                          .generation = pointer->generation,
                                          .is_tool = true,
                                          .mu = hit->mu};
+      w->spoilt = w->spoilt || hit->feel != 0;
       if (hit->tool_count > 0) {
         window_note_touch(w, most, &touch);
       }

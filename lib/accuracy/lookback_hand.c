@@ -483,7 +483,7 @@ static void hand_resume(hapi_lookback *w)
   hapi_tool_place(&t->touches, &t->pointers, &t->bodies, &t->facts);
   for (uint32_t i = 0; i < t->touches.count; ++i) {
     hapi_local_contact *c = &t->touches.of[i];
-    const hapi_state_spring *spring = c->rubs ? hand_find_spring(w, c) : NULL;
+    const hapi_state_spring *spring = c->feel.rubs ? hand_find_spring(w, c) : NULL;
     ramp_resume(&c->ramp, &c->seen);
     if (spring != NULL && (c->tool == 0 || t->touches.tool.tools[c->tool - 1].placed)) {
       spring_resume(t, c, spring);

@@ -67,6 +67,7 @@
 #define HAPI_SAFETY_CONTACT_DEPTH 0.01      /* m */
 #define HAPI_SAFETY_CONTACT_SPEED 0.2       /* m/s */
 #define HAPI_SAFETY_CONTACT_PRESS_MOST 10.0 /* m/s */
+#define HAPI_SAFETY_TEXTURE_HEIGHT 0.003    /* m */
 
 /* ---- energy ---- */
 #define HAPI_SAFETY_OVERDRAFT 0.006      /* 1 */

@@ -487,6 +487,7 @@ static void tool_pair_add(const hapi_contact *contact, const placed_tool *tool,
     out->pointer_generation = tool->in->generation;
     out->same_within = hapi_tool_same_within(tool->in->extent);
     out->mu = pair->mu;
+    out->feel = pair->feel;
     out->geom = pair->tag;
     hapi_touch_localise(&a, &b, &patch.points[i], &out->at);
     out->at.key = pair->key;

@@ -7,6 +7,7 @@
 #include "base/safety.h"
 #include "base/vec.h"
 #include "local/pointer_friction.h"
+#include "local/touch_feel.h"
 
 /* The ledger of what the hands may get back. It gains what a hand puts in, and what the world
  * loses; it pays what a hand is given:
@@ -170,7 +171,8 @@ static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *p
       continue;
     }
     double felt = p->guard.felt * hand_gets(p);
-    *io_stored += p->rigid ? 0.0 : half_compliance(p) * force2 / c->weight;
+    *io_stored +=
+        p->rigid ? 0.0 : half_compliance(p) * hapi_touch_softer(c, p) * force2 / c->weight;
     if (body != NULL && (body->flags & HAPI_BODY_OWNED) == 0) {
       sum -= work_on(facts->period, body, c);
     } else if (body != NULL && felt < 1.0) { /* it has the whole force, the hand a share */
@@ -211,25 +213,25 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     const hapi_pointer *p = &pointers->of[c->pointer];
     hapi_ramp *r = &c->ramp;
     double share = c->hidden ? 0.0 : r->share * p->guard.felt;
-    double energy =
-        spring_energy(p, c->weight * share * p->surface.stiffness, r->depth - r->excess);
-    double rubs = c->mu > 0.0 ? hapi_friction_energy(touches, tick, c) : 0.0;
+    double stiffness = hapi_touch_stiffness(c, p);
+    double depth = r->depth + (c->feel.special ? c->feel.lift : 0.0);
+    double energy = spring_energy(p, c->weight * share * stiffness, depth - r->excess);
+    double rubs = c->feel.mu > 0.0 ? hapi_friction_energy(touches, tick, c) : 0.0;
     gone -= r->sprung;
     if (share != r->felt_share || r->excess != r->felt_excess ||
-        p->surface.added != 0.0) { /* seldom */
+        stiffness != r->felt_stiffness) { /* seldom */
       /* Over a jump the hand paid for no depth, so none of it is lost. */
       double excess = r->late || p->device.jumped ? r->excess : r->felt_excess;
-      double before = p->surface.stiffness - p->surface.added;
-      sum += energy - spring_energy(p, c->weight * r->felt_share * before, r->depth - excess);
-      double unpaid = r->depth - r->excess - r->given;
-      sum += hand_gets(p) *
-             (energy - spring_energy(p, c->weight * share * p->surface.stiffness, unpaid));
+      double before = c->weight * r->felt_share * r->felt_stiffness;
+      sum += energy - spring_energy(p, before, depth - excess);
+      double unpaid = depth - r->excess - r->given;
+      sum += hand_gets(p) * (energy - spring_energy(p, c->weight * share * stiffness, unpaid));
       sum +=
           (p->guard.felt - r->felt) * rubs; /* a deep contact's friction comes in with its limit */
-      sum += p->surface.stiffness > 0.0 ? r->felt * rubs * p->surface.added / p->surface.stiffness
-                                        : 0.0;
+      sum += stiffness > 0.0 ? r->felt * rubs * (stiffness - r->felt_stiffness) / stiffness : 0.0;
       r->felt_share = share;
       r->felt_excess = r->excess;
+      r->felt_stiffness = stiffness;
       r->felt = p->guard.felt;
     }
     r->sprung = energy + p->guard.felt * rubs;

@@ -49,7 +49,7 @@ static bool force_is_on(const hapi_pointers *pointers)
 static double pointer_holds_for(const hapi_pointer *p, double period)
 {
   double k = p->proxied ? p->coupling.stiffness
-                        : hapi_max(p->coupling.contact_stiffness, p->surface.stiffness);
+                        : hapi_max(p->coupling.contact_stiffness, hapi_pointer_stiffest(p));
   if (!p->coupling.hold_known || !(k > 0.0)) {
     return period;
   }

@@ -207,7 +207,7 @@ static bool axis_follow(hapi_swing_axis *s, const hapi_swing_end *now, double la
 static double stiffness_felt(const hapi_pointer *p)
 {
   double touched = p->proxied ? p->coupling.stiffness
-                              : p->surface.stiffness * hapi_max((double)p->contacts, 1.0);
+                              : hapi_pointer_stiffest(p) * hapi_max((double)p->contacts, 1.0);
   return touched + p->declared.stiffness;
 }
 

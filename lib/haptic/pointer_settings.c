@@ -195,13 +195,11 @@ static void pointer_glide(const hapi_haptic *haptic, const hapi_pointer_slot *sl
 {
   hapi_pointer_glides *g = &p->glides;
   double seconds = haptic->tick.facts.period;
-  double stiffness = p->surface.stiffness;
   double motion_scale = p->device.motion_scale;
   bool any = glide_follow(&g->stiffness, seconds, &p->surface.stiffness);
   any |= glide_follow(&g->damping, seconds, &p->surface.damping);
   any |= glide_follow(&g->friction, seconds, &p->surface.friction);
   any |= glide_follow(&g->finger_radius, seconds, &p->surface.finger_radius);
-  p->surface.added = p->surface.stiffness - stiffness;
   bool scales = glide_follow(&g->force_scale, seconds, &p->device.force_scale);
   if (glide_follow(&g->motion_scale, seconds, &motion_scale)) {
     hapi_frame_set_scale(p, motion_scale, g->stands);

@@ -9,7 +9,8 @@
  *   |f' - f| <= k (|dx| + T |u|) + d (|dv| + |du|)
  *
  * with dx and dv of the pointer, and u the velocity of the surface where it is touched. A damper
- * that begins or ends adds d (|v| + |u|), and a contact that comes in slowly its force in its time.
+ * that begins or ends adds d (|v| + |u|), a contact that comes in slowly its force in its time, and
+ * a texture what its height and slope have changed.
  * Sums of absolute values stand for norms: they are larger, and need no root. */
 
 #include <math.h>
@@ -18,6 +19,7 @@
 #include "base/vec.h"
 #include "local/body.h"
 #include "local/touch.h"
+#include "local/touch_feel.h"
 #include "pointer/pointer.h"
 
 static inline double hapi_sum_of_sizes(const double v[3])
@@ -37,12 +39,19 @@ static inline void hapi_contact_explain(hapi_pointer *p, const hapi_local_contac
                                         const hapi_local_body *body, double period)
 {
   hapi_explained *e = &p->guard.explained;
-  double k = c->weight * (p->rigid ? p->coupling.stiffness : p->surface.stiffness);
-  double d =
-      !(depth > 0.0) ? 0.0 : c->weight * (p->proxied ? p->coupling.damping : p->surface.damping);
+  double k = c->weight * (p->rigid ? p->coupling.stiffness : hapi_touch_stiffness(c, p));
+  double d = !(depth > 0.0)
+                 ? 0.0
+                 : c->weight * (p->proxied ? p->coupling.damping : hapi_touch_damping(c, p));
   double comes = 0.0;
   e->stiffness += k;
-  e->world += c->weight * fabs(p->surface.added) * fmax(depth, 0.0); /* a setting, in its time */
+  if (c->ramp.felt_stiffness > 0.0) { /* one that is set changes in its time */
+    double added = fabs(hapi_touch_stiffness(c, p) - c->ramp.felt_stiffness);
+    e->world += c->weight * added * fmax(depth, 0.0);
+  }
+  if (c->feel.special) { /* what a texture does on the hand's way */
+    e->world += k * (c->feel.lifted + fmax(depth, 0.0) * c->feel.turned);
+  }
   e->damping += d;
   if (c->ramp.share < 1.0) {
     comes = fmax(depth, 0.0) / HAPI_SAFETY_CONTACT_RAMP_S;

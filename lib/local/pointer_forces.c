@@ -5,6 +5,7 @@
 #include "base/vec.h"
 #include "local/explained.h"
 #include "local/pointer_friction.h"
+#include "local/touch_feel.h"
 
 /* A sum that is kept: a force that is not finite, which the guard stops, would stay in it for
  * ever. */
@@ -46,7 +47,7 @@ static inline void contact_press(hapi_pointer *p, hapi_local_contact *c, const h
 {
   if (c->row != HAPI_NO_ROW) {
     double force = rows->solver.rows[c->row].impulse / period;
-    hapi_v3_scale(-force, c->normal_now, c->force);
+    hapi_v3_scale(-force, hapi_touch_push(c), c->force);
   }
   if (c->tool != 0 && p->device.feels_torque) {
     uint64_t begin = hapi_effect_begin(sample);
@@ -87,7 +88,7 @@ static __attribute__((noinline)) void forces_with_friction(
     hapi_local_contact *c = &touches->of[i];
     hapi_pointer *p = &pointers->of[c->pointer];
     contact_press(p, c, rows, facts->period, sample);
-    if (c->rubs) {
+    if (c->feel.rubs) {
       uint64_t begin = hapi_effect_begin(sample);
       hapi_friction_rub(touches, rows, facts, c, p);
       hapi_effect_end(sample, HAP_EFFECT_FRICTION, begin);

@@ -7,6 +7,7 @@
 
 #include "base/assert.h"
 #include "base/vec.h"
+#include "local/touch_feel.h"
 
 /* The anchors stay where they are as long as nothing slides: displacements are taken from them as
  * they are placed now, and not summed up from velocities, so that no noise and no motion that comes
@@ -325,7 +326,7 @@ hapi_friction *hapi_friction_begin(const hapi_touches *touches, const hapi_bodie
                                    uint64_t tick, const hapi_local_contact *contact,
                                    const hapi_rub_place *at)
 {
-  if (!contact->rubs) {
+  if (!contact->feel.rubs) {
     return NULL;
   }
   const hapi_pointer *p = at->pointer;
@@ -348,8 +349,9 @@ hapi_friction *hapi_friction_begin(const hapi_touches *touches, const hapi_bodie
   f->tick = tick;
   f->epoch = epoch;
   f->rigid = p->rigid;
-  f->stiffness = p->rigid ? p->coupling.stiffness : contact->weight * p->surface.stiffness;
-  f->damping = p->rigid ? p->surface.damping : contact->weight * p->surface.damping;
+  f->stiffness =
+      p->rigid ? p->coupling.stiffness : contact->weight * hapi_touch_stiffness(contact, p);
+  f->damping = p->rigid ? p->surface.damping : contact->weight * hapi_touch_damping(contact, p);
   f->left = 1.0;
   f->axis_count = p->surface.finger_radius > 0.0 ? 3 : 2;
   measure_stretch(f, p, at->body, at->normal);
@@ -422,7 +424,7 @@ void hapi_friction_rub(const hapi_touches *touches, const hapi_rows *rows,
   if (f == NULL) {
     return;
   }
-  double limit = c->mu * hapi_v3_norm(c->force);
+  double limit = c->feel.mu * hapi_touch_load(c);
   friction_force(rows, c, f, facts->period, limit, push);
   hapi_friction_wrench(f, p, push, c->point_now, &wrench);
   hapi_v3_add(c->force, wrench.force, c->force);

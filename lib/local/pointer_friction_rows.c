@@ -86,7 +86,7 @@ static bool add_friction_row(double period, const hapi_local_contact *contact,
   HAPI_ASSERT_INDEX(number, rows->capacity);
   set_friction_columns(contact, at, f, f->axes[axis], row);
   fill_friction_spring(at, f, f->axes[axis], row, &p);
-  row->mu = contact->mu;
+  row->mu = contact->feel.mu;
   row->single = !at->pointer->proxied;
   solver->apart = false;
   row->ball = axis == 0 ? (uint8_t)f->axis_count : 0;
@@ -96,7 +96,7 @@ static bool add_friction_row(double period, const hapi_local_contact *contact,
   if (at->pointer->coupling.integration == HAP_INTEGRATION_EXPLICIT) {
     row->normal = -1;
     row->ball = 0;
-    row->lo = row->hi = fmin(row->impulse, contact->mu * normal->hi);
+    row->lo = row->hi = fmin(row->impulse, contact->feel.mu * normal->hi);
     row->softness = row->target = 0.0;
   } else if (!hapi_spring_soften(row, at->pointer, &p, period)) {
     return false;

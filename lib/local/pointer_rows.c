@@ -10,6 +10,7 @@
 #include "local/contact_ramp.h"
 #include "local/pointer_spring.h"
 #include "local/seams.h"
+#include "local/touch_follow.h"
 #include "proximity/constrained_ball.h"
 
 /* Pointer contacts as rows of the solver: pointer_spring.h says which. Those of friction are in
@@ -211,10 +212,11 @@ static bool pointer_place(const hapi_touches *touches, hapi_local_contact *c, do
 static void push_static(hapi_local_contact *c, const hapi_placed_pointer *at, double speed)
 {
   const hapi_pointer *p = at->pointer;
-  double force = at->depth > 0.0
-                     ? at->share * (p->surface.stiffness * at->depth + p->surface.damping * speed)
-                     : 0.0;
-  hapi_v3_scale(force > 0.0 ? -force : 0.0, at->normal, c->force);
+  double force =
+      at->depth > 0.0
+          ? at->share * (hapi_touch_stiffness(c, p) * at->depth + hapi_touch_damping(c, p) * speed)
+          : 0.0;
+  hapi_v3_scale(force > 0.0 ? -force : 0.0, at->push, c->force);
 }
 
 /* Eq. 7 as it stands: the row's impulse is given. */
@@ -243,7 +245,7 @@ static void point_velocity(const hapi_placed_pointer *at, const double linear[3]
 static void set_way(hapi_placed_pointer *at)
 {
   double arm[3];
-  hapi_v3_scale(-1.0, at->normal, at->j);
+  hapi_v3_scale(-1.0, at->push, at->j);
   hapi_v3_set(at->j + 3, 0.0, 0.0, 0.0);
   at->w = 0.0;
   if (at->body != NULL) {
@@ -258,13 +260,13 @@ static void set_proxy_column(const hapi_placed_pointer *at, hapi_row *row, hapi_
   const hapi_pointer *p = at->pointer;
   memset(row->jb, 0, sizeof row->jb);
   memset(row->bb, 0, sizeof row->bb);
-  hapi_v3_copy(at->normal, row->jb);
+  hapi_v3_copy(at->push, row->jb);
   hapi_v3_scale(p->proxy.response, row->jb, row->bb);
   row->b = p->proxy.row;
   out->w += hapi_v3_dot(row->jb, p->proxy.velocity);
   out->free += hapi_v3_dot(row->jb, p->proxy.free_velocity);
   if (p->shape.hull != NULL) {
-    hapi_v3_cross(at->arm, at->normal, row->jb + 3);
+    hapi_v3_cross(at->arm, at->push, row->jb + 3);
     hapi_v3_scale(p->proxy.spin_response, row->jb + 3, row->bb + 3);
     out->w += hapi_v3_dot(row->jb + 3, p->proxy.spin);
     out->free += hapi_v3_dot(row->jb + 3, p->proxy.free_spin);
@@ -316,8 +318,9 @@ static void add_row(double period, hapi_local_contact *contact, const hapi_place
   hapi_solver *solver = &rows->solver;
   uint32_t number = solver->row_count;
   hapi_row *row = &solver->rows[number];
-  hapi_pointer_spring p = {.k = at->share * at->pointer->surface.stiffness,
-                           .d = at->depth > 0.0 ? at->share * at->pointer->surface.damping : 0.0,
+  const hapi_pointer *of = at->pointer;
+  hapi_pointer_spring p = {.k = at->share * hapi_touch_stiffness(contact, of),
+                           .d = at->depth > 0.0 ? at->share * hapi_touch_damping(contact, of) : 0.0,
                            .depth = at->depth};
   HAPI_ASSERT_INDEX(number, rows->capacity);
   if (at->pointer->rigid) {
@@ -409,7 +412,7 @@ static inline void contact_take(const hapi_tick_facts *facts, const hapi_tool_wo
     motion = hapi_v3_dot(at->j, velocity) - at->w;
   }
   if (!p->rigid && at->depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
-    at->pointer->coupling.near_stiffness += c->weight * at->pointer->surface.stiffness;
+    at->pointer->coupling.near_stiffness += c->weight * hapi_touch_stiffness(c, p);
   }
   /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
   bool comes = at->depth > 0.0 || (at->depth + way > 0.0 && period * motion < 0.25 * size_of(p));
@@ -460,6 +463,16 @@ static void pointer_placed(const hapi_tool_world *tools, hapi_local_contact *c,
   }
 }
 
+static __attribute__((noinline, cold)) void contact_feel(const hapi_tick_facts *facts,
+                                                         hapi_touches *touches,
+                                                         hapi_local_contact *c,
+                                                         hapi_placed_pointer *at)
+{
+  const hapi_feel_place place = {at->pointer, at->body, at->normal, at->point};
+  hapi_touch_feel_follow(touches, facts, &place, c, &at->depth);
+  at->push = c->feel.push;
+}
+
 void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointers,
                        const hapi_bodies *bodies, hapi_touches *touches, hapi_rows *rows,
                        hapi_effect_sample *sample)
@@ -489,8 +502,12 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
       hapi_v3_set(c->force, 0.0, 0.0, 0.0);
       continue;
     }
+    at.push = c->normal_now;
+    if (c->feel.special) {
+      contact_feel(facts, touches, c, &at);
+    }
     contact_take(facts, &touches->tool, c, &at, rows);
-    if (c->rubs) {
+    if (c->feel.rubs) {
       const hapi_placed_pointer rubs = {
           .index = i, .pointer = at.pointer, .body = at.body, .depth = at.depth};
       contact_rub(facts, bodies, touches, rows, sample, &rubs); /* so that at stays in registers */

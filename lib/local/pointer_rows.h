@@ -19,6 +19,7 @@ typedef struct hapi_placed_pointer {
   hapi_local_body *body; /* NULL: static world */
   const double *normal;  /* out of the body: normal_now and point_now of the contact */
   const double *point;
+  const double *push; /* of a force of 1 N along the normal; other than it where there is texture */
   double depth;
   double share; /* of the stiffness, that is felt */
   double j[6];  /* of the body, of a force into it at the point; NULL: the force alone */

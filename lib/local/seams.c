@@ -76,7 +76,7 @@ static void friction_hand_over(const hapi_tick_facts *facts, const hapi_pointer 
   const hapi_local_body *before = hapi_bodies_at(bodies, from->body);
   double stretch[3];
   double foot[3];
-  if (!from->rubs || !to->rubs || !friction_held(held, from, facts->tick) ||
+  if (!from->feel.rubs || !to->feel.rubs || !friction_held(held, from, facts->tick) ||
       friction_held(taker, to, facts->tick)) {
     return;
   }

@@ -6,6 +6,7 @@
 
 #include "base/assert.h"
 #include "base/vec.h"
+#include "local/touch_feel.h"
 #include "local/touch_frame.h"
 
 /* The points of a hull's patches are found anew again and again. One that is near to where one of
@@ -193,9 +194,8 @@ static void tool_add(hapi_touches *touches, const hapi_bodies *bodies, const hap
   c->pointer = in->pointer;
   c->pointer_generation = in->pointer_generation;
   c->asked.geom = in->geom;
-  c->mu = in->mu;
-  c->rubs = hapi_touch_rubs(in->mu, wishes);
-  touches->rubs |= c->rubs;
+  const hapi_feel_told told = {in->mu, in->feel, wishes, old != HAPI_SLOT_NONE};
+  hapi_touch_feel_adopt(touches, &told, c);
   c->tool = at + 1;
   c->row = HAPI_NO_ROW;
   ++w->count;
@@ -276,7 +276,8 @@ static void tools_put_back(hapi_touches *touches)
   memcpy(&touches->of[touches->count], w->old_contacts, w->count * sizeof *w->old_contacts);
   touches->count += w->count;
   for (uint32_t i = 0; i < w->count; ++i) {
-    touches->rubs |= w->old_contacts[i].rubs;
+    hapi_touch_feel_find(touches, &hapi_touches_of_tools(touches)[i]);
+    touches->rubs |= w->old_contacts[i].feel.rubs;
   }
 }
 

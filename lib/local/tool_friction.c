@@ -34,7 +34,7 @@ static bool point_holds(const hapi_touches *touches, uint64_t tick, const hapi_l
 {
   const hapi_friction *f = hapi_friction_of(touches, c);
   bool closed = f->stiffness > 0.0 && f->tick + 1 >= tick;
-  return closed && c->mu > 0.0 && touches->tool.tools[c->tool - 1].placed &&
+  return closed && c->feel.mu > 0.0 && touches->tool.tools[c->tool - 1].placed &&
          hapi_v3_dot(f->normal, normal) > ALIKE_COSINE;
 }
 

@@ -8,7 +8,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "base/wishes.h"
 #include "proximity/constrained_ball.h"
 #include "sync/messages.h"
 
@@ -25,7 +24,8 @@ typedef struct hapi_ramp {
   double felt_share; /* with what the guard took */
   double felt;       /* what the guard left of friction */
   double felt_excess;
-  double sprung; /* J in the spring, as it was felt */
+  double felt_stiffness; /* N/m */
+  double sprung;         /* J in the spring, as it was felt */
 } hapi_ramp;
 
 /* Where the anchors of a contact's friction are. */
@@ -74,6 +74,35 @@ typedef struct hapi_touch_shape {
   hapi_told told; /* of its surface, into hapi_touches.triangles; where it is no shape */
 } hapi_touch_shape;
 
+/* How a contact is felt in this tick. */
+typedef struct hapi_touch_feel {
+  bool rubs;       /* friction is worked out: there is some, or it was asked for */
+  bool special;    /* a surface of its own; else stiffness and damping are the pointer's */
+  uint32_t number; /* as hapi_model_feel.number */
+  uint32_t pair;   /* of a special one: index into the feels */
+  double mu;
+  double stiffness; /* N/m */
+  double damping;   /* N s/m */
+  double lift;      /* m, that the texture is above the geom */
+  double push[3];   /* along which it pushes: the unit normal less the slope of the texture */
+  double lifted;    /* m, by which lift has changed since the tick before, whatever its sign */
+  double turned;    /* the same of push: sum over its parts */
+} hapi_touch_feel;
+
+#define HAPI_FEEL_SAID (-1.0) /* stiffness of a pair that has just come */
+#define HAPI_FEEL_OWN (-2.0)  /* and has pressed with the pointer's up to now */
+
+/* A pointer and a geom with a surface of its own. */
+typedef struct hapi_pair_feel {
+  hapi_model_feel in;
+  uint64_t tick; /* of the state behind: */
+  bool presses;
+  bool pressed;     /* in the tick before */
+  double stiffness; /* N/m: on its way to what is said */
+  const hapi_texture *texture;
+  double lift_share; /* 0..1, of a texture that comes in */
+} hapi_pair_feel;
+
 /* Accelerance of the body, world axes. */
 typedef struct hapi_touch_response {
   double a[6][3]; /* by one N at the contact, eq. 6 */
@@ -93,20 +122,19 @@ typedef struct hapi_local_contact {
   bool placed;    /* in this tick, where pointers touch several things */
   bool hidden;    /* in this tick: the surface goes on behind it, see seams.h */
   bool is_hidden; /* by what the model says; for shapes that the loop does not ask */
-  bool rubs;      /* friction is worked out: there is some, or it was asked for */
 
   double point_body[3];
   double normal_body[3];
   hapi_ramp ramp;
   hapi_constrained_ball ball; /* of a sphere, in the body's frame; model CONTACT */
-  double mu;
-  double weight;        /* 0..1, share of the pointer's stiffness; of a sphere 1 */
-  double force[3];      /* on the body */
-  double couple[3];     /* N m, on the body about the contact point; friction */
-  double normal_now[3]; /* model CONTACT, and of hulls all: world, out of the body */
+  double weight;              /* 0..1, share of the pointer's stiffness; of a sphere 1 */
+  double force[3];            /* on the body */
+  double couple[3];           /* N m, on the body about the contact point; friction */
+  double normal_now[3];       /* model CONTACT, and of hulls all: world, out of the body */
   double point_now[3];
   hapi_touch_response response;
   hapi_touch_shape asked;
+  hapi_touch_feel feel;
 } hapi_local_contact;
 
 /* A contact of a pointer that is a hull, beside its hapi_local_contact. */
@@ -214,17 +242,15 @@ typedef struct hapi_touches {
   hapi_friction *frictions; /* by contact slot; of spheres */
   hapi_tool_world tool;
   hapi_crosses crosses;
+  hapi_pair_feel *feels;     /* capacity.feels */
+  hapi_pair_feel *old_feels; /* scratch of adopting */
+  uint32_t feel_count;
+  uint32_t unsound; /* index + 1 of a pointer that touches a texture without height; 0: none */
   hapi_triangle *triangles; /* of the model, each in its body's frame; capacity.triangles */
   uint64_t contact_ticks;   /* in which something pushed; this and the next since start */
   double hand_impulse[3];   /* N s on dynamic bodies, all pointers */
   double hand_impulse_abs;
 } hapi_touches;
-
-/* Whether friction is worked out. */
-static inline bool hapi_touch_rubs(double mu, uint32_t wishes)
-{
-  return mu > 0.0 || hapi_wish_is_on(wishes, HAP_EFFECT_FRICTION);
-}
 
 /* What is kept of the contact. */
 static inline hapi_friction *hapi_friction_of(const hapi_touches *touches,
@@ -239,7 +265,7 @@ static inline hapi_friction *hapi_friction_now(const hapi_touches *touches, uint
                                                const hapi_local_contact *contact)
 {
   hapi_friction *f = hapi_friction_of(touches, contact);
-  bool acts = contact->rubs && f->generation == contact->generation && f->tick == tick;
+  bool acts = contact->feel.rubs && f->generation == contact->generation && f->tick == tick;
   return acts ? f : NULL;
 }
 

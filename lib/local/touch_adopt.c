@@ -6,6 +6,7 @@
 
 #include "base/assert.h"
 #include "local/tool_adopt.h"
+#include "local/touch_feel.h"
 #include "local/touch_frame.h"
 
 static uint32_t epoch_of(const hapi_bodies *bodies, uint32_t slot)
@@ -41,9 +42,6 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
   memcpy(out->response.a, in->a, sizeof out->response.a);
   memcpy(out->response.turn, in->turn, sizeof out->response.turn);
   out->asked.geom = in->geom;
-  out->mu = in->mu;
-  out->rubs = hapi_touch_rubs(in->mu, wishes);
-  touches->rubs |= out->rubs;
   out->weight = 1.0;
   out->asked.has = in->has_shape != 0;
   out->is_hidden = in->hidden != 0;
@@ -51,7 +49,8 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
   out->asked.pose = in->shape_pose;
   out->asked.told = in->told;
   out->epoch = epoch_of(bodies, in->body);
-  if (kept->generation == in->generation) {
+  bool goes_on = kept->generation == in->generation;
+  if (goes_on) {
     out->seen = true;
     out->ramp = kept->ramp;
     out->ball = kept->ball;
@@ -62,6 +61,8 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
       hapi_friction_hand_over(frame, &touches->frictions[in->slot]);
     }
   }
+  const hapi_feel_told told = {in->mu, in->feel, wishes, goes_on};
+  hapi_touch_feel_adopt(touches, &told, out);
 }
 
 /* Those of contact number from of the message, which is number to here; *at: the first of them. */
@@ -85,6 +86,7 @@ void hapi_touches_adopt(hapi_touches *touches, const hapi_pointers *pointers,
 {
   const hapi_model_contact *in = hapi_model_contacts(model);
   hapi_tool_set_aside(touches);
+  hapi_feels_adopt(touches, model);
   uint32_t cross = 0;
   touches_keep(touches);
   touches->count = 0;

@@ -81,6 +81,12 @@ uint64_t hapi_geom_names_get(hapi_geom_names *names, dGeomID geom, uint64_t mode
   return name->number;
 }
 
+uint64_t hapi_geom_names_find(const hapi_geom_names *names, dGeomID geom)
+{
+  uint32_t at = hapi_index_get(&names->by_address, hapi_index_address(geom));
+  return at != HAPI_INDEX_NONE ? names->list[at].number : 0;
+}
+
 void hapi_geom_names_forget(hapi_geom_names *names, dGeomID geom)
 {
   uint32_t at = hapi_index_get(&names->by_address, hapi_index_address(geom));

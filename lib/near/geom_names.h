@@ -33,6 +33,8 @@ void hapi_geom_names_clear(hapi_geom_names *names); /* models are counted from 1
  * memory the number comes from the address. */
 uint64_t hapi_geom_names_get(hapi_geom_names *names, dGeomID geom, uint64_t model);
 
+uint64_t hapi_geom_names_find(const hapi_geom_names *names, dGeomID geom); /* 0: it has none */
+
 void hapi_geom_names_forget(hapi_geom_names *names, dGeomID geom);
 
 #endif

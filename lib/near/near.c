@@ -63,6 +63,7 @@ void hapi_nearby_reset(hapi_nearby *nearby)
 {
   hapi_range_reset(nearby);
   hapi_geom_names_clear(&nearby->tools.names);
+  hapi_neighbors_reset(nearby);
   hapi_meshes_finish(&nearby->meshes); /* the application may have changed them */
   if (nearby->visits != NULL) {
     memset(nearby->visits, 0, nearby->visit_capacity * sizeof *nearby->visits);

@@ -1,6 +1,5 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,6 +33,20 @@ void hapi_neighbors_finish(hapi_nearby *nearby)
 {
   hapi_cover_finish(&nearby->neighbors.cover);
   hapi_relief_finish(nearby);
+  hapi_feels_finish(&nearby->neighbors.feels);
+}
+
+void hapi_neighbors_reset(hapi_nearby *nearby)
+{
+  hapi_feels_clear(&nearby->neighbors.feels);
+}
+
+void hapi_neighbors_forget_feel(hapi_nearby *nearby, dGeomID geom)
+{
+  uint64_t name = geom != NULL ? hapi_geom_names_find(&nearby->tools.names, geom) : 0;
+  if (geom == NULL || name != 0) {
+    hapi_feels_renew(&nearby->neighbors.feels, name);
+  }
 }
 
 double hapi_neighbors_reach(double relative_speed, double horizon_s)
@@ -340,31 +353,6 @@ static int hit_by_distance(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-#define FRICTION_MOST 10.0 /* as between bodies */
-
-/* What the application says of the pair. */
-static double hit_friction(hapi_nearby *nearby, const hapi_hit *hit,
-                           const hapi_state_pointer *pointer)
-{
-  double mu = pointer->friction;
-  if (hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_FRICTION)) {
-    return 0.0;
-  }
-  if (nearby->world->ode.pointer_surface == NULL) {
-    return mu;
-  }
-  hap_pointer_id id = {hapi_pointer_id_of(pointer->generation, hit->pointer + 1)};
-  nearby->world->ode.pointer_surface(nearby->world->ode.user, id, hit->geom, &mu);
-  if (!(mu >= 0.0 && mu <= DBL_MAX)) { /* NaN too */
-    nearby->cycle->config->report(
-        nearby->cycle->config->user, HAP_FAULT_WORLD,
-        "the pointer_surface callback gave a friction that is not finite or "
-        "below 0: the pointer slides on the geom without any");
-    return 0.0;
-  }
-  return fmin(mu, FRICTION_MOST);
-}
-
 static void place_contact(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_hit *hit,
                           const hapi_state_pointer *pointer)
 {
@@ -492,14 +480,13 @@ static void take_body(hapi_body_slot *local, dBodyID body)
                                          : 0;
 }
 
-static void take_hit(hapi_nearby *nearby, hapi_hit *hit)
+static void take_hit(hapi_nearby *nearby, const hapi_hit *hit)
 {
   dBodyID body = hapi_geom_body(nearby->world, hit->geom);
   const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[hit->pointer];
   uint32_t slot = body != NULL ? hapi_slots_body(nearby, body_of_hit(nearby, hit)) : HAPI_SLOT_NONE;
   hapi_contact_slot *contact = NULL;
   if (hit->tool_count > 0 && (body == NULL || slot != HAPI_NONE)) {
-    hit->mu = hit_friction(nearby, hit, pointer);
     hapi_tool_take(nearby, hit, slot);
     if (body != NULL) {
       take_body(&nearby->slots.bodies[slot], body);
@@ -515,7 +502,7 @@ static void take_hit(hapi_nearby *nearby, hapi_hit *hit)
   }
   contact->wanted = true;
   place_contact(nearby, contact, hit, pointer);
-  contact->mu = hit_friction(nearby, hit, pointer);
+  contact->said = (hapi_contact_said){hit->mu, hit->feel};
   if (body != NULL) {
     take_body(&nearby->slots.bodies[slot], body);
   }
@@ -609,9 +596,11 @@ void hapi_neighbors_find(hapi_nearby *nearby)
   }
   for (uint32_t i = 0; i < hood->candidate_count; ++i) {
     hapi_hit *hit = &hood->hits[count];
-    if (hood->candidates[i].geom != NULL && find_hit(nearby, &hood->candidates[i], hit)) {
-      hit->geom = hood->candidates[i].geom;
-      hit->pointer = hood->candidates[i].pointer;
+    const hapi_candidate *near = &hood->candidates[i];
+    if (near->geom != NULL && find_hit(nearby, near, hit) &&
+        hapi_feels_ask(nearby, near->pointer, near->geom, &hit->mu, &hit->feel)) {
+      hit->geom = near->geom;
+      hit->pointer = near->pointer;
       ++count;
     }
   }

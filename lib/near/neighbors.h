@@ -11,6 +11,7 @@
 #include <ode/ode.h>
 
 #include "near/cover.h"
+#include "near/feels.h"
 #include "near/relief.h"
 #include "proximity/proximity.h"
 #include "sync/messages.h"
@@ -31,7 +32,8 @@ typedef struct hapi_hit {
   uint32_t tool_count;  /* 0: a sphere */
   hap_pose tool_pose;   /* for which they were found */
   bool hidden;          /* of a sphere: by a nearer one, of the same surface */
-  double mu;            /* of a hull, of all of its points, once it is taken */
+  double mu;            /* of the pair, as the application says */
+  uint32_t feel;        /* as hapi_model_contact.feel */
 } hapi_hit;
 
 typedef struct hapi_neighbors {
@@ -47,6 +49,7 @@ typedef struct hapi_neighbors {
   uint32_t hit_count;    /* that the newest model has */
   hapi_cover cover;
   hapi_relief relief;
+  hapi_feels feels;
   bool said_crowded;        /* of what is touched and finds no room, once a session */
   double fastest;           /* m/s, of all awake bodies' surfaces */
   uint32_t current_pointer; /* while ODE calls back */
@@ -56,6 +59,10 @@ typedef struct hapi_neighbors {
 /* Part of hapi_nearby_create. False: no memory; finish is due all the same. */
 bool hapi_neighbors_create(hapi_nearby *nearby);
 void hapi_neighbors_finish(hapi_nearby *nearby);
+void hapi_neighbors_reset(hapi_nearby *nearby); /* a session begins */
+
+/* Of a geom, NULL of all: pointer_surface is asked again. */
+void hapi_neighbors_forget_feel(hapi_nearby *nearby, dGeomID geom);
 void hapi_neighbors_collect(hapi_nearby *nearby); /* before the global step */
 void hapi_neighbors_find(hapi_nearby *nearby);    /* after it: bodies and contacts of the model */
 double hapi_neighbors_speed(const hapi_nearby *nearby, dGeomID geom,

@@ -441,6 +441,7 @@ static void add_tool_pair(hapi_nearby *nearby, const hapi_hit *hit, uint32_t geo
   pair->geom = geom;
   pair->tag = hit->geom;
   pair->mu = hit->mu;
+  pair->feel = hit->feel;
 }
 
 static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)

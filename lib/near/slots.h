@@ -52,6 +52,12 @@ typedef struct hapi_last_touch {
   double normal[3]; /* unit, body frame */
 } hapi_last_touch;
 
+/* What the application says of pointer and geom. */
+typedef struct hapi_contact_said {
+  double mu;
+  uint32_t feel; /* as hapi_model_contact.feel */
+} hapi_contact_said;
+
 typedef struct hapi_contact_slot {
   hapi_slot_phase phase;
   uint32_t generation; /* grows with each new contact in this place */
@@ -72,9 +78,9 @@ typedef struct hapi_contact_slot {
   double distance;       /* m, then */
   double speed;          /* m/s, pointer against body */
   double stiffness;      /* N/m, the pointer's */
-  double mu;             /* of the pair, as the application says */
-  double finger_radius;  /* m, the pointer's; 0: no torsion */
-  double last_force[3];  /* on the body, newest message */
+  hapi_contact_said said;
+  double finger_radius; /* m, the pointer's; 0: no torsion */
+  double last_force[3]; /* on the body, newest message */
   hapi_last_touch last_touch;
   bool is_tool; /* a point of a hull's patch */
   hapi_tool_point tool;

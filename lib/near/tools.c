@@ -609,9 +609,10 @@ static void slot_place(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_
   slot->speed = hapi_neighbors_speed(nearby, hit->geom, pointer, slot->point_world);
   slot->stiffness = pointer->stiffness;
   slot->finger_radius = pointer->finger_radius;
-  slot->mu = hit->mu;
+  slot->said = (hapi_contact_said){hit->mu, hit->feel};
   slot->tool = point->tool;
   slot->tool.mu = hit->mu;
+  slot->tool.feel = hit->feel;
   slot->tool.geom = hit->geom;
   slot->tool.at.body_b = slot->body;
   slot->tool.at.generation_b =

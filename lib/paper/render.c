@@ -10,6 +10,7 @@
 #include "local/explained.h"
 #include "local/pointer_friction.h"
 #include "local/tool_place.h"
+#include "local/touch_follow.h"
 
 /* Haptic rendering with a plane per contact as intermediate representation (paper section 5.1). */
 
@@ -17,6 +18,7 @@ typedef struct plane {
   hapi_local_body *body; /* NULL: static world */
   double point[3];       /* contact point x_o, world */
   double normal[3];      /* out of the body, world */
+  const double *push;    /* of a force of 1 N along it */
   double arm[3];         /* x_o - centre of mass */
   double force;          /* N, along the normal */
 } plane;
@@ -35,14 +37,14 @@ static double closing_rate(const hapi_pointer *p, const plane *at, double *out_o
     hapi_v3_cross(p->twist.angular, arm, swing);
     hapi_v3_add(relative, swing, relative);
   }
-  *out_own = -hapi_v3_dot(at->normal, relative);
+  *out_own = -hapi_v3_dot(at->push, relative);
   if (body != NULL) {
     double surface[3];
     hapi_v3_cross(body->twist.angular, at->arm, surface);
     hapi_v3_add(surface, body->twist.linear, surface);
     hapi_v3_sub(relative, surface, relative);
   }
-  return -hapi_v3_dot(at->normal, relative);
+  return -hapi_v3_dot(at->push, relative);
 }
 
 /* Depth, and the share of the stiffness, of a sphere or of one point of a hull. */
@@ -70,10 +72,11 @@ static double normal_force(const hapi_tick_facts *facts, hapi_local_contact *c, 
     return 0.0;
   }
   double closing = closing_rate(p, at, &own);
-  double force = p->surface.stiffness * depth + p->surface.damping * closing;
+  double force = hapi_touch_stiffness(c, p) * depth + hapi_touch_damping(c, p) * closing;
   force = force > 0.0 ? share * force : 0.0;
   if (facts->observes) {
-    p->guard.force2 += force > 0.0 ? force * force / c->weight : 0.0;
+    double softer = hapi_touch_softer(c, p);
+    p->guard.force2 += force > 0.0 ? softer * force * force / c->weight : 0.0;
     p->guard.power += force * (closing - own);
   }
   return force;
@@ -103,7 +106,7 @@ static void contact_rub(const hapi_tick_facts *facts, const hapi_bodies *bodies,
   double push[4];
   hap_wrench on_body;
   hap_wrench on_hand;
-  double limit = c->mu * at->force;
+  double limit = c->feel.mu * at->force;
   hapi_friction_foot(p, at->normal, at->point, foot);
   const hapi_rub_place place = {p, body, at->normal, foot};
   hapi_friction *f = hapi_friction_begin(touches, bodies, facts->tick, c, &place);
@@ -120,7 +123,8 @@ static void contact_rub(const hapi_tick_facts *facts, const hapi_bodies *bodies,
   if (p->device.feels_torque) {
     hapi_v3_sub(p->wrench.torque, on_hand.torque, p->wrench.torque);
   }
-  p->guard.force2 += (hapi_v3_dot(push, push) + push[3] * push[3]) / c->weight;
+  double softer = hapi_touch_softer(c, p);
+  p->guard.force2 += softer * (hapi_v3_dot(push, push) + push[3] * push[3]) / c->weight;
   p->guard.power += friction_loads(body, at, &on_body);
   if (body != NULL) {
     double turning = p->surface.finger_radius * push[3];
@@ -185,23 +189,29 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
     return;
   }
   double share = depth_of(&touches->tool, c, p, &at, facts->period, &depth);
+  at.push = at.normal;
+  if (c->feel.special) {
+    const hapi_feel_place place = {p, at.body, at.normal, at.point};
+    hapi_touch_feel_follow(touches, facts, &place, c, &depth);
+    at.push = c->feel.push;
+  }
   c->hidden = c->is_hidden;
   double force = c->hidden ? 0.0 : normal_force(facts, c, p, &at, share, depth);
   if (force == 0.0 || facts->faulted) {
     return;
   }
   at.force = force;
-  hapi_v3_scale(-force, at.normal, c->force);
+  hapi_v3_scale(-force, at.push, c->force);
   if (c->tool != 0 && p->device.feels_torque) {
     uint64_t begin = hapi_effect_begin(sample);
     double arm[3];
     double moment[3];
     hapi_v3_sub(at.point, p->pose.position, arm);
-    hapi_v3_cross(arm, at.normal, moment);
+    hapi_v3_cross(arm, at.push, moment);
     hapi_v3_madd(p->wrench.torque, force, moment, p->wrench.torque);
     hapi_effect_end(sample, HAP_EFFECT_TORQUE, begin);
   }
-  if (c->rubs) {
+  if (c->feel.rubs) {
     uint64_t begin = hapi_effect_begin(sample);
     contact_rub(facts, bodies, touches, c, p, &at);
     hapi_effect_end(sample, HAP_EFFECT_FRICTION, begin);

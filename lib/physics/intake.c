@@ -147,6 +147,11 @@ void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
   hapi_lookback_forget_geom(&physics->lookback, (dGeomID)(uintptr_t)geom);
 }
 
+void hapi_physics_surface_changed(hapi_physics *physics, const void *geom)
+{
+  hapi_neighbors_forget_feel(&physics->near, (dGeomID)(uintptr_t)geom);
+}
+
 hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody *body,
                                            void (*callback)(struct dxBody *))
 {

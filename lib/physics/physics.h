@@ -74,6 +74,7 @@ hap_status hapi_physics_set_moved_callback(hapi_physics *physics, struct dxBody 
 hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const *bodies,
                                      size_t count);
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom);
+void hapi_physics_surface_changed(hapi_physics *physics, const void *geom); /* NULL: of all */
 #define HAPI_ALL_KNOWN SIZE_MAX
 
 /* [any] At the time drawn for time_ns; newest of all; roles. HAP_ERROR_NOT_FOUND: the body at

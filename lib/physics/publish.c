@@ -220,7 +220,8 @@ static void fill_contact(const hapi_contact_slot *slot, const hapi_contact_answe
   memcpy(out->a, answer->a, sizeof out->a);
   memcpy(out->turn, answer->turn, sizeof out->turn);
   out->geom = slot->geom;
-  out->mu = slot->mu;
+  out->mu = slot->said.mu;
+  out->feel = slot->said.feel;
   out->has_shape = slot->has_shape;
   out->hidden = slot->hidden;
   out->shape = slot->shape;
@@ -463,6 +464,7 @@ void hapi_physics_make_model(hapi_physics *physics, int64_t state_ns, int64_t va
     }
   }
   publish_contacts(&p, out);
+  hapi_feels_publish(&physics->near, out);
   out->cross_count = 0;
   for (uint32_t i = 0; i < out->contact_count; ++i) {
     hapi_cross_publish(&physics->cross, hapi_model_contacts(out)[i].slot, i, out);

@@ -210,6 +210,17 @@ static uint64_t hash_measured(uint64_t hash, const hapi_measured_joint *m)
   return hapi_hash_doubles(hash, m->given, 6);
 }
 
+static uint64_t hash_feel(uint64_t hash, const hapi_model_feel *of)
+{
+  const hapi_feel *feel = &of->feel;
+  const double values[] = {feel->mu, feel->mu_static, feel->stiffness, feel->damping};
+  hash = hapi_hash_word(hash, ((uint64_t)of->number << 32) | feel->more);
+  hash = hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
+  hash = hapi_hash_word(hash, feel->texture_number);
+  hash = hapi_hash_doubles(hash, feel->geom.position, 3);
+  return hapi_hash_doubles(hash, feel->geom.quat_wxyz, 4);
+}
+
 static uint64_t hash_model(hapi_model *model)
 {
   const hapi_model_body *b = hapi_model_bodies(model);
@@ -232,6 +243,9 @@ static uint64_t hash_model(hapi_model *model)
     hash = hapi_hash_doubles(hash, c[i].a[0], 18);
     hash = hapi_hash_doubles(hash, c[i].turn, 6);
     hash = hapi_hash_doubles(hash, &c[i].mu, 1);
+  }
+  for (uint32_t i = 0; i < model->feel_count; ++i) {
+    hash = hash_feel(hash, &hapi_model_feels(model)[i]);
   }
   for (uint32_t i = 0; i < model->triangle_count; ++i) {
     hash = hapi_hash_doubles(hash, hapi_model_triangles(model)[i].corners, 9);

@@ -30,7 +30,7 @@ typedef struct hapi_pointer_surface {
   double damping;
   double friction;
   double finger_radius; /* m, of the torsion; 0: none */
-  double added;         /* N/m, that a setting has added to the stiffness in this tick */
+  double hardest; /* N/m, of the surfaces near it that have a stiffness of their own; 0: none */
 } hapi_pointer_surface;
 
 /* At the device. */
@@ -267,6 +267,12 @@ typedef struct hapi_pointer {
   hapi_pointer_frame frame;
   hapi_pointer_glides glides;
 } hapi_pointer;
+
+/* N/m, of the pointer or of what it may touch. */
+static inline double hapi_pointer_stiffest(const hapi_pointer *p)
+{
+  return p->surface.stiffness > p->surface.hardest ? p->surface.stiffness : p->surface.hardest;
+}
 
 typedef struct hapi_pointers {
   hapi_pointer *of;      /* capacity.pointers */

@@ -147,8 +147,8 @@ static void bodies_measure_b(hapi_probe *probe)
 
 static bool contact_has_axis(const hapi_probe *probe, const hapi_contact_slot *contact, int axis)
 {
-  return axis != TORSION || (probe->cycle->model == HAP_MODEL_ACCELERANCE && contact->mu > 0.0 &&
-                             contact->finger_radius > 0.0);
+  return axis != TORSION || (probe->cycle->model == HAP_MODEL_ACCELERANCE &&
+                             contact->said.mu > 0.0 && contact->finger_radius > 0.0);
 }
 
 /* About the operating point it is small, and goes into the body: a pull at a body that does not

@@ -288,7 +288,7 @@ static void print_pushed_contact(printer *p, uint32_t index)
   print_value(p, contact->generation, SAME);
   print_value(p, contact->body, SAME);
   print_value(p, answer->probed, SAME);
-  print_value(p, contact->mu > 0.0, SAME);
+  print_value(p, contact->said.mu > 0.0, SAME);
   print_value(p, contact->finger_radius, SAME);
   print_vector(p, contact->point_body, 3, 1.0);
   print_vector(p, contact->normal_body, 3, m.arm);

@@ -92,6 +92,7 @@ void hapi_session_free(hap_session *session)
   if (!stuck) {
     hapi_exchange_destroy(session->exchange);
     hapi_recorder_destroy(session->recorder);
+    hapi_textures_destroy(session->textures);
   }
   pthread_mutex_destroy(&session->detail_lock);
   hapi_free(session);

@@ -18,6 +18,7 @@
 #include "physics/physics.h"
 #include "record/recorder.h"
 #include "sync/exchange.h"
+#include "sync/texture.h"
 
 #define HAPI_POINTER_COOKIE 0x48505431u /* recordings have it */
 
@@ -27,6 +28,7 @@ struct hap_session {
   hap_research_def research;
   hapi_exchange *exchange;
   hapi_haptic *haptic;
+  hapi_textures *textures;
   hapi_physics *physics;
   hapi_contact *contact;
   bool started;

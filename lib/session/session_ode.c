@@ -83,6 +83,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
       .frame = def->drive == HAP_DRIVE_FRAME,
       .rt_priority = def->rt_priority,
       .exchange = session->exchange,
+      .textures = session->textures,
       .report = world_report,
       .user = session,
   };
@@ -97,6 +98,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
 
 #define TRIANGLES 2048u  /* near all pointers that are spheres */
 #define TOOL_POINTS 256u /* of all pointers that are hulls: a few dozen touches */
+#define FEELS 128u       /* geoms with a surface of their own, near pointers */
 
 /* At a low rate of physics a body in a pile is near thirty others, and touches eight. */
 #define PAIRS_PER_CONTACT 3u
@@ -121,6 +123,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .springs = looks_back ? (uint32_t)def->max_contacts + 2 * TOOL_POINTS : 0,
       .crosses = 8 * (uint32_t)def->max_bodies,
       .triangles = TRIANGLES,
+      .feels = FEELS,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
          capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {
@@ -135,7 +138,10 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
 {
   const hap_session_def *def = &session->def;
   hapi_capacity capacity = capacity_of(def);
-  hap_status status = hapi_exchange_create(&capacity, &session->exchange);
+  session->textures = hapi_textures_create();
+  hap_status status = session->textures != NULL
+                          ? hapi_exchange_create(&capacity, &session->exchange)
+                          : HAP_ERROR_MEMORY;
   if (status >= HAP_OK) {
     hapi_haptic_config config = {
         .capacity = capacity,
@@ -239,6 +245,13 @@ hap_status hap_session_forget_geom(hap_session *session, dGeomID geom)
 {
   HAPI_TRY(may_edit(session, geom));
   hapi_physics_forget_geom(session->physics, geom);
+  return HAP_OK;
+}
+
+hap_status hap_session_surface_changed(hap_session *session, dGeomID geom)
+{
+  HAPI_TRY(may_edit(session, session));
+  hapi_physics_surface_changed(session->physics, geom);
   return HAP_OK;
 }
 

@@ -63,6 +63,7 @@ static const message_array arrays[] = {
     MODEL(crosses_offset, cross_count, hapi_model_cross, crosses),
     MODEL(courses_offset, course_count, hapi_model_course, bodies),
     MODEL(triangles_offset, triangle_count, hapi_triangle, triangles),
+    MODEL(feels_offset, feel_count, hapi_model_feel, feels),
 #define STATE(...) ARRAY(HAPI_CHANNEL_STATE, hapi_state, __VA_ARGS__)
     STATE(bodies_offset, body_high, hapi_state_body, bodies),
     STATE(contacts_offset, contact_count, hapi_state_contact, contacts),

@@ -7,6 +7,7 @@
 
 #include "proximity/ball_among.h"
 #include "proximity/patch.h"
+#include "sync/feel.h"
 #include "sync/message.h"
 #include "sync/patches.h"
 
@@ -187,20 +188,27 @@ typedef struct hapi_model_contact {
   uint32_t body; /* slot; HAPI_SLOT_NONE: part of the static world */
   uint32_t pointer;
   uint32_t pointer_generation;
-  uint32_t has_shape; /* shape and shape_pose can be asked for the nearest point at every tick */
-  uint32_t hidden;    /* by a nearer one, of the same surface: it does not push */
-  uint32_t reserved;
+  uint32_t has_shape;    /* shape and shape_pose can be asked for the nearest point at every tick */
+  uint32_t hidden;       /* by a nearer one, of the same surface: it does not push */
+  uint32_t feel;         /* number of a hapi_model_feel; 0: as the pointer has it */
   double point_body[3];  /* contact point, body frame (world frame for the static world) */
   double normal_body[3]; /* unit, out of the body */
   double a[6][3];        /* accelerance of eq. 6: force at the contact point, world axes */
   double turn[6];        /* the same of a torque about the normal: soft finger, model ACCELERANCE */
-  double mu;             /* friction of the pointer against the body; 0: none */
+  double mu;             /* friction of the pointer against the body; 0: none; the static one */
   hapi_shape shape;      /* one with a closed form against a sphere */
   hap_pose shape_pose;   /* in the body's frame */
   uint32_t tool;         /* of a hull: 1 + index into the model's tool points; 0: of a sphere */
   hapi_tag geom;
   hapi_told told; /* of the surface, where it is told in triangles */
 } hapi_model_contact;
+
+/* Of a pointer and a geom near it. */
+typedef struct hapi_model_feel {
+  uint32_t number; /* of the pair, as long as the two are near each other */
+  uint32_t pointer;
+  hapi_feel feel;
+} hapi_model_feel;
 
 /* Cross accelerance: what a force at a pointer contact does to another body. */
 typedef struct hapi_model_cross {
@@ -235,6 +243,7 @@ typedef struct hapi_model {
   uint32_t cross_count;    /* model ACCELERANCE */
   uint32_t course_count;   /* of models but CONTACT those alone that begin */
   uint32_t triangle_count; /* model CONTACT */
+  uint32_t feel_count;
   uint32_t bodies_offset;
   uint32_t contacts_offset;
   uint32_t joints_offset;
@@ -242,6 +251,7 @@ typedef struct hapi_model {
   uint32_t crosses_offset;
   uint32_t courses_offset;
   uint32_t triangles_offset;
+  uint32_t feels_offset;
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];      /* HAPI_SLOT_NONE: not local */
   double watch_position[HAP_TRACE_BODIES_MAX][3]; /* at state_ns */
 } hapi_model;
@@ -253,5 +263,6 @@ HAPI_MESSAGE_ARRAY(hapi_model_tools, hapi_model, hapi_tool_point, tools_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_courses, hapi_model, hapi_model_course, courses_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_crosses, hapi_model, hapi_model_cross, crosses_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_triangles, hapi_model, hapi_triangle, triangles_offset)
+HAPI_MESSAGE_ARRAY(hapi_model_feels, hapi_model, hapi_model_feel, feels_offset)
 
 #endif

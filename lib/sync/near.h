@@ -53,7 +53,8 @@ typedef struct hapi_near_tool_pair {
   uint32_t tool;
   uint32_t geom;
   hapi_tag tag;
-  double mu; /* of its points */
+  double mu;     /* of its points */
+  uint32_t feel; /* likewise */
 } hapi_near_tool_pair;
 
 typedef struct hapi_near {

@@ -69,6 +69,7 @@ typedef struct hapi_tool_point {
   uint32_t pointer_generation;
   double same_within; /* m, pointer's frame: a new point matches an old one nearer than this */
   double mu;          /* friction of the pointer against the geom; 0: none */
+  uint32_t feel;      /* as hapi_model_contact.feel */
   uint64_t group;     /* the same for the points of all pairs that adjoin, see tool_seams.h */
   hapi_tag geom;
   hapi_patch_contact at;

@@ -12,6 +12,7 @@ typedef struct hapi_state_pointer {
   uint32_t collide_bits;
   double radius;
   double stiffness;
+  double damping;
   double friction;
   double finger_radius;
   hap_pose pose;

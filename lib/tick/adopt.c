@@ -38,16 +38,31 @@ static void pointers_adopt(hapi_pointers *pointers, hapi_model *model)
 {
   const hapi_model_contact *contacts = hapi_model_contacts(model);
   hap_effect_wish torque = hapi_wish(model->wishes, HAP_EFFECT_TORQUE);
+  bool friction = hapi_wish_is_on(model->wishes, HAP_EFFECT_FRICTION);
   bool proxies = false;
   for (uint32_t i = 0; i < pointers->high; ++i) {
     bool any = false;
     for (uint32_t k = 0; k < model->contact_count && !any; ++k) {
-      any = contacts[k].pointer == i && hapi_touch_rubs(contacts[k].mu, model->wishes);
+      any = contacts[k].pointer == i && (contacts[k].mu > 0.0 || friction);
     }
     proxies = proxies || may_be_proxy(&pointers->of[i], model->wishes);
     hapi_pointer_feel(&pointers->of[i], torque, any);
   }
   pointers->proxies = proxies;
+}
+
+/* How hard the surfaces are that are harder than the pointers. */
+static void pointers_note_hardest(const hapi_pointers *pointers, const hapi_touches *touches)
+{
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    pointers->of[i].surface.hardest = 0.0;
+  }
+  for (uint32_t i = 0; i < touches->feel_count; ++i) {
+    const hapi_model_feel *in = &touches->feels[i].in;
+    HAPI_ASSERT_INDEX(in->pointer, pointers->high);
+    double *hardest = &pointers->of[in->pointer].surface.hardest;
+    *hardest = hapi_max(*hardest, in->feel.stiffness);
+  }
 }
 
 void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
@@ -61,6 +76,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   HAPI_ASSERT(model->joint_count <= tick->capacity.joints);
   HAPI_ASSERT(model->cross_count <= tick->capacity.crosses);
   HAPI_ASSERT(model->triangle_count <= tick->capacity.triangles);
+  HAPI_ASSERT(model->feel_count <= tick->capacity.feels);
   HAPI_ASSERT(model->watch_count <= HAP_TRACE_BODIES_MAX);
   hapi_local_bodies_adopt(&tick->bodies, model, now_ns, age_s, facts);
   solver->max_sweeps = model->max_sweeps;
@@ -75,6 +91,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   pointers_adopt(&tick->pointers, model);
   hapi_touches_adopt(&tick->touches, &tick->pointers, &tick->bodies, model);
   hapi_joints_adopt(&tick->joints, model);
+  pointers_note_hardest(&tick->pointers, &tick->touches);
   facts->wishes = model->wishes;
   facts->bounces = model->bounces > 0 || hapi_wish_is_on(model->wishes, HAP_EFFECT_RESTITUTION);
   facts->observes = observes;

@@ -85,7 +85,7 @@ static void report_springs(const hapi_touches *touches, uint64_t tick, hapi_stat
   out->spring_count = 0;
   for (uint32_t i = 0; i < touches->count && out->spring_count < out->spring_capacity; ++i) {
     const hapi_local_contact *c = &touches->of[i];
-    const hapi_friction *f = c->rubs ? hapi_friction_of(touches, c) : NULL;
+    const hapi_friction *f = c->feel.rubs ? hapi_friction_of(touches, c) : NULL;
     if (f == NULL || f->tick + 1 != tick || f->rigid || !(f->stiffness > 0.0)) {
       continue;
     }
@@ -144,6 +144,7 @@ static void report_pointers(const hapi_pointers *from, hapi_state *out)
     pointers[i].collide_bits = in->shape.collide_bits;
     pointers[i].radius = in->shape.radius;
     pointers[i].stiffness = in->surface.stiffness;
+    pointers[i].damping = in->surface.damping;
     pointers[i].friction = in->surface.friction;
     pointers[i].finger_radius = in->surface.finger_radius;
     pointers[i].pose = in->pose;

@@ -154,8 +154,8 @@ static void felt_add(const hapi_tick *tick, const hapi_local_contact *c, hapi_fe
   hapi_v3_sub(told->force, c->force, told->force);
   felt->weight += weight;
   felt->slot = c->body;
-  felt->rubs |= c->rubs;
-  felt->slips |= c->rubs && contact_slips(tick, c);
+  felt->rubs |= c->feel.rubs;
+  felt->slips |= c->feel.rubs && contact_slips(tick, c);
   ++told->points;
 }
 

@@ -42,6 +42,8 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(touches.tool.pairs, HAPI_TOOL_PAIRS(c)),
       ARRAY(touches.crosses.of, c->crosses),
       ARRAY(touches.triangles, c->triangles),
+      ARRAY(touches.feels, c->feels),
+      ARRAY(touches.old_feels, c->feels),
       ARRAY(contacts.memory, c->contacts),
       ARRAY(contacts.old_memory, c->contacts),
       ARRAY(contacts.buckets, tick->contacts.bucket_count),
@@ -77,6 +79,7 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->bodies = (hapi_bodies){
       .of = tick->bodies.of, .courses = tick->bodies.courses, .live = tick->bodies.live};
   touches->count = touches->pushing = 0;
+  touches->feel_count = touches->unsound = 0;
   touches->rubs = false;
   touches->contact_ticks = 0;
   memset(touches->hand_impulse, 0, sizeof touches->hand_impulse);
@@ -185,6 +188,10 @@ void hapi_tick_answer(hapi_tick *tick)
     hapi_contact_step(tick);
   } else {
     paper_step(tick);
+  }
+  if (tick->touches.unsound > 0) {
+    hapi_tick_fault(tick, HAP_FAULT_FORCE, tick->touches.unsound);
+    tick->touches.unsound = 0;
   }
   hapi_tick_guard(tick);
   if (tick->hashing) {

@@ -13,6 +13,7 @@
 #include <hapode/stats.h>
 
 #include "sync/exchange.h"
+#include "sync/texture.h"
 
 /* As in hap_expert_def: HAP_BY_ACCURACY, or the fixed value. */
 typedef struct hapi_knobs {
@@ -57,6 +58,7 @@ typedef struct hapi_physics_config {
   bool frame; /* drive FRAME: a cycle may come later than the time that it is for */
   int rt_priority;
   hapi_exchange *exchange;
+  const hapi_textures *textures; /* NULL: there are none */
   /* [physics] HAP_FAULT_NONE: something that the application should know, but no fault */
   void (*report)(void *user, hap_fault fault, const char *text);
   void *user;

@@ -1,0 +1,76 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SURFACE_H
+#define HAPODE_SURFACE_H
+
+/* How a pointer feels a geom (docs/surfaces.md). The application says it in the callback
+ * hap_ode_def.pointer_surface of hapode/ode.h. */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hapode/attributes.h>
+#include <hapode/session.h>
+#include <hapode/status.h>
+
+HAP_BEGIN_DECLS
+
+/* The surface of a geom against a pointer. It comes to the callback with what the pointer has of
+ * its own (hap_pointer_def). A member that is left as it came stays the pointer's. It has a size
+ * and may grow at its end. */
+typedef struct hap_surface {
+  uint32_t size; /* set by the library: of its build; members behind it are not read */
+  /* 1 as it comes. 0: the pointer goes through the geom, as through a trigger volume. */
+  uint32_t touchable;
+  double stiffness; /* N/m, 0..1e9, of the contact, in place of hap_pointer_def.stiffness */
+  double damping;   /* N s/m, 0..1e6, likewise */
+  /* Coulomb friction: of a touch that sticks, and of one that slides, 0..10; above 10 is taken as
+   * 10. Both come with hap_pointer_def.friction. A static one below the dynamic one is taken as
+   * the dynamic one. */
+  double friction_static;
+  double friction_dynamic;
+  uint32_t texture; /* of hap_session_add_texture; 0, as it comes: smooth */
+} hap_surface;
+
+/* [haptic] m, -0.003..0.003: the height of a surface over a geom, at a point of the geom's frame;
+ * of a plane that of the world. What is beyond the bounds is cut off. It is called in the tick,
+ * five times for each contact: its time is the tick's. It must give the same for the same point, in
+ * any thread, and neither wait, allocate nor call the system. A height that is not finite is
+ * HAP_FAULT_FORCE. */
+typedef double (*hap_height_fn)(void *arg, const double point[3]);
+
+/* A texture: heights of a surface over a geom, felt as force along and across it. A patch of
+ * samples or a function. It has a size and may grow at its end. */
+typedef struct hap_texture_def {
+  uint32_t size;   /* set by hap_texture_def_init */
+  uint32_t cookie; /* set by hap_texture_def_init */
+  /* m, -0.003..0.003, row after row: heights[row * columns + column]; copied. Between samples the
+   * surface is a cubic. NULL (default): a function. */
+  const double *heights;
+  int32_t columns;  /* 1..4096 */
+  int32_t rows;     /* 1..4096 */
+  double pitch;     /* m, from sample to sample, 1e-6..1, default 1e-3 */
+  uint32_t repeats; /* 1 (default): the patch lies side by side; 0: its border goes on */
+  /* Unit vectors of the geom's frame, at right angles: the way of the columns and that of the rows;
+   * default x and y. Along their cross product the height is the same. */
+  double along_columns[3];
+  double along_rows[3];
+  double origin[3]; /* m, geom's frame: where the first sample is; default 0 */
+
+  hap_height_fn height; /* without heights; default NULL */
+  void *arg;            /* handed to it; the caller's, until the session is destroyed */
+} hap_texture_def;
+
+/* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
+HAP_API void hap_texture_def_init(hap_texture_def *def, size_t size_of_def);
+
+/* [any] Makes a texture, also while the session runs. It is there until the session is destroyed;
+ * at most 64. *out_texture: for hap_surface.texture. HAP_ERROR_ARGUMENT, HAP_ERROR_UNINITIALISED:
+ * hap_session_detail names the field. HAP_ERROR_CAPACITY: there are 64. HAP_ERROR_MEMORY. */
+HAP_NODISCARD HAP_API hap_status hap_session_add_texture(hap_session *session,
+                                                         const hap_texture_def *def,
+                                                         uint32_t *out_texture);
+
+HAP_END_DECLS
+
+#endif

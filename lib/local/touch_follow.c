@@ -1,0 +1,177 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "local/touch_follow.h"
+
+#include "base/assert.h"
+#include "base/pose.h"
+#include "base/safety.h"
+#include "base/vec.h"
+#include "local/ball_nearest.h"
+#include "local/pointer_friction.h"
+#include "local/texture.h"
+
+#define FOOT_STEP 1e-6 /* m */
+#define FOOT_MOST 2.0  /* FOOT_STEPs: no surface is so hollow where a ball touches it once */
+
+/* A surface that changes under a contact that presses changes its stiffness slowly: all at once the
+ * force would leap by the depth times the difference. */
+static void stiffness_follow(hapi_pair_feel *pair, const hapi_pointer *p, double period)
+{
+  bool springs = (pair->in.feel.more & HAPI_FEEL_SPRING) != 0;
+  double wanted = springs ? pair->in.feel.stiffness : p->surface.stiffness;
+  if (pair->stiffness < 0.0) {
+    pair->pressed = pair->stiffness == HAPI_FEEL_OWN;
+    pair->stiffness = pair->pressed ? p->surface.stiffness : wanted;
+  }
+  double most = period / HAPI_SAFETY_CONTACT_RAMP_S * hapi_max(wanted, pair->stiffness);
+  pair->stiffness = pair->pressed
+                        ? hapi_min(hapi_max(wanted, pair->stiffness - most), pair->stiffness + most)
+                        : wanted;
+}
+
+/* Nor does a texture that comes under a contact that presses leap. */
+static void texture_follow(hapi_pair_feel *pair, double period)
+{
+  const hapi_texture *wanted = pair->in.feel.texture;
+  if (wanted != pair->texture) {
+    pair->texture = wanted;
+    pair->lift_share = pair->pressed ? 0.0 : 1.0;
+  }
+  double most = period / HAPI_SAFETY_CONTACT_RAMP_S;
+  pair->lift_share = pair->pressed ? hapi_min(pair->lift_share + most, 1.0) : 1.0;
+}
+
+/* Once in each tick. */
+static void pair_follow(hapi_pair_feel *pair, const hapi_tick_facts *facts, const hapi_pointer *p)
+{
+  if (pair->tick != facts->tick || pair->stiffness < 0.0) {
+    pair->pressed = pair->presses;
+    pair->presses = false;
+    pair->tick = facts->tick;
+    stiffness_follow(pair, p, facts->period);
+    texture_follow(pair, facts->period);
+  }
+}
+
+/* Whether friction let the contact slide in the tick before. */
+static bool contact_slid(const hapi_touches *touches, const hapi_tick_facts *facts,
+                         const hapi_local_contact *c)
+{
+  const hapi_friction *f = hapi_friction_of(touches, c);
+  bool there = f->generation == c->generation && f->tick + 1 == facts->tick;
+  return c->feel.rubs && there && (f->rigid ? f->slid : f->left < 1.0);
+}
+
+/* A touch of a textured surface, in the frame of the geom's body. */
+typedef struct textured_spot {
+  double center[3]; /* of the pointer */
+  double foot[3];   /* on the surface */
+  double normal[3];
+} textured_spot;
+
+static void spot_find(const hapi_feel_place *at, textured_spot *out)
+{
+  const double *center = at->pointer->pose.position;
+  hapi_friction_foot(at->pointer, at->normal, at->point, out->foot);
+  hapi_v3_copy(center, out->center);
+  hapi_v3_copy(at->normal, out->normal);
+  if (at->body != NULL) {
+    const hap_pose *pose = &at->body->pose;
+    hapi_pose_unpoint(pose->position, pose->quat_wxyz, out->foot, out->foot);
+    hapi_pose_unpoint(pose->position, pose->quat_wxyz, center, out->center);
+    hapi_quat_unrotate(pose->quat_wxyz, at->normal, out->normal);
+  }
+}
+
+/* On a surface that is curved the foot goes less far than the ball, and over an edge it stays: then
+ * the height changes by as much less. *io: slope by the foot, then by the ball. */
+static void slope_of_ball(const hapi_local_contact *c, const textured_spot *spot, double radius,
+                          double *io)
+{
+  static const hapi_touch_frame own = {NULL, NULL};
+  double along[2][3];
+  double slope[3] = {0.0, 0.0, 0.0};
+  hapi_nearest here;
+  hapi_texture_tangents(spot->normal, along);
+  if (!hapi_ball_nearest(spot->center, radius, &c->asked.shape, &c->asked.pose, &own, &here)) {
+    return;
+  }
+  for (int i = 0; i < 2; ++i) {
+    double beside[3];
+    double way[3];
+    hapi_nearest nearest;
+    hapi_v3_madd(spot->center, FOOT_STEP, along[i], beside);
+    if (!hapi_ball_nearest(beside, radius, &c->asked.shape, &c->asked.pose, &own, &nearest)) {
+      return;
+    }
+    hapi_v3_sub(nearest.point_b, here.point_b, way);
+    if (hapi_v3_norm(way) > FOOT_MOST * FOOT_STEP) {
+      return; /* deep in it the nearest side may be another one */
+    }
+    hapi_v3_madd(slope, hapi_v3_dot(io, way) / FOOT_STEP, along[i], slope);
+  }
+  hapi_v3_copy(slope, io);
+}
+
+/* A spring of stiffness k whose depth is that of the geom and the height h of the texture has the
+ * energy k (g + h)^2 / 2 and the force k (g + h) (n - grad h), n out of the geom: what pushes along
+ * the surface is what climbing costs, and no way round gives any energy. A hull's face on a corner
+ * of the geom stays at one place of the texture: it has no slope. False: a height that is not
+ * finite. */
+static bool contact_lift(const hapi_touches *touches, const hapi_pair_feel *pair,
+                         const hapi_feel_place *at, hapi_local_contact *c)
+{
+  textured_spot spot;
+  double point[3];
+  double normal[3];
+  double slope[3];
+  const hap_pose *geom = &pair->in.feel.geom;
+  spot_find(at, &spot);
+  hapi_pose_unpoint(geom->position, geom->quat_wxyz, spot.foot, point);
+  hapi_quat_unrotate(geom->quat_wxyz, spot.normal, normal);
+  double height = hapi_texture_height(pair->texture, point, normal, slope);
+  if (!hapi_finite(&height, 1) || !hapi_finite(slope, 3)) {
+    return false;
+  }
+  c->feel.lift = pair->lift_share * height;
+  bool stays = c->tool != 0 && touches->tool.tools[c->tool - 1].in.at.touch == HAPI_TOUCH_FACE_A;
+  if (stays) {
+    return true;
+  }
+  hapi_quat_rotate(geom->quat_wxyz, slope, slope);
+  if (c->asked.has && c->asked.told.count == 0 && c->asked.shape.kind != HAPI_SHAPE_PLANE) {
+    slope_of_ball(c, &spot, at->pointer->shape.radius, slope);
+  }
+  if (at->body != NULL) {
+    hapi_quat_rotate(at->body->pose.quat_wxyz, slope, slope);
+  }
+  hapi_v3_madd(slope, -hapi_v3_dot(slope, at->normal), at->normal, slope);
+  hapi_v3_madd(c->feel.push, -pair->lift_share, slope, c->feel.push);
+  return true;
+}
+
+void hapi_touch_feel_follow(hapi_touches *touches, const hapi_tick_facts *facts,
+                            const hapi_feel_place *at, hapi_local_contact *c, double *io_depth)
+{
+  HAPI_ASSERT_INDEX(c->feel.pair, touches->feel_count);
+  hapi_pair_feel *pair = &touches->feels[c->feel.pair];
+  const hapi_feel *said = &pair->in.feel;
+  const hapi_pointer *p = at->pointer;
+  const hapi_touch_feel before = c->feel;
+  pair_follow(pair, facts, p);
+  c->feel.stiffness = pair->stiffness;
+  c->feel.damping = (said->more & HAPI_FEEL_SPRING) != 0 ? said->damping : p->surface.damping;
+  c->feel.mu = contact_slid(touches, facts, c) ? said->mu : said->mu_static;
+  c->feel.lift = 0.0;
+  hapi_v3_copy(at->normal, c->feel.push);
+  if (pair->texture != NULL && !contact_lift(touches, pair, at, c)) {
+    touches->unsound = c->pointer + 1;
+  }
+  c->feel.lifted = pair->texture != NULL ? fabs(c->feel.lift - before.lift) : 0.0;
+  c->feel.turned = 0.0;
+  for (int i = 0; pair->texture != NULL && i < 3; ++i) {
+    c->feel.turned += fabs(c->feel.push[i] - before.push[i]);
+  }
+  *io_depth += c->feel.lift;
+  pair->presses = pair->presses || *io_depth > 0.0;
+}

@@ -1,0 +1,25 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_LOCAL_TOUCH_FOLLOW_H
+#define HAPODE_LOCAL_TOUCH_FOLLOW_H
+
+/* What a surface of its own makes of a contact, tick by tick. */
+
+#include "local/body.h"
+#include "local/facts.h"
+#include "local/touch_feel.h"
+
+/* Where a contact is in this tick. */
+typedef struct hapi_feel_place {
+  const hapi_pointer *pointer;
+  const hapi_local_body *body; /* NULL: static world */
+  const double *normal;        /* unit, world */
+  const double *point;         /* world, on the surface or in it */
+} hapi_feel_place;
+
+/* Of a contact that is special, once in each tick, after it is placed. *io_depth: m, of the geom
+ * before, and with the texture after. */
+void hapi_touch_feel_follow(hapi_touches *touches, const hapi_tick_facts *facts,
+                            const hapi_feel_place *at, hapi_local_contact *c, double *io_depth);
+
+#endif

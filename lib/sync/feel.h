@@ -1,0 +1,32 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SYNC_FEEL_H
+#define HAPODE_SYNC_FEEL_H
+
+/* How a pointer feels a geom, as the application says it (hapode/surface.h), checked. */
+
+#include <stdint.h>
+
+#include <hapode/spatial.h>
+
+#include "sync/texture.h"
+
+/* What is not the pointer's own spring with one coefficient of friction. */
+enum {
+  HAPI_FEEL_SPRING = 1, /* stiffness and damping */
+  HAPI_FEEL_STATIC = 2, /* what sticks holds more than what slides */
+  HAPI_FEEL_TEXTURE = 4
+};
+
+typedef struct hapi_feel {
+  uint32_t more; /* HAPI_FEEL_* */
+  uint32_t texture_number;
+  double mu;                   /* friction of what slides; 0: none */
+  double mu_static;            /* of what sticks; mu or more */
+  double stiffness;            /* N/m; SPRING */
+  double damping;              /* N s/m; SPRING */
+  const hapi_texture *texture; /* NULL: smooth */
+  hap_pose geom;               /* of its frame in that of its body; TEXTURE */
+} hapi_feel;
+
+#endif
