@@ -25,6 +25,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "own_device": "docs/writing-a-device.md",
     "own_forces": "docs/forces.md",
     "sandpaper_and_ice": "docs/surfaces.md",
+    "push_without_ode": "docs/scene.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -166,6 +167,12 @@ def check_own_forces(program):
     point(len(rows) == 20 and max(along[1:9]) <= 0.8 and max(along[12:]) > 0.8,
           "the clicks get harder", str(rows))
     point(all(-1.3 < float(row[2]) < -1.1 for row in rows[1:]), "the rail pulls", str(rows))
+def check_push_without_ode(program):
+    rows = rows_of(run(program), r"^mallet at (-?[0-9.]+) m, hand feels (-?[0-9.]+) N$")
+    point(len(rows) == 5 and float(rows[0][0]) == 0.0 and float(rows[-1][0]) > 0.1,
+          "the mallet is pushed on", str(rows))
+    point(len(rows) == 5 and abs(float(rows[-2][1]) + 1.95) < 0.1, "the hand feels its friction",
+          str(rows))
 
 
 def check_record_and_play(program):

@@ -18,6 +18,7 @@
 #include <hapode/pointer_set.h>
 #include <hapode/record.h>
 #include <hapode/research.h>
+#include <hapode/scene.h>
 #include <hapode/session.h>
 #include <hapode/spatial.h>
 #include <hapode/stats.h>

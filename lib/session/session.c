@@ -94,6 +94,9 @@ void hapi_session_free(hap_session *session)
     hapi_recorder_destroy(session->recorder);
     hapi_textures_destroy(session->textures);
   }
+  if (session->gone != NULL) {
+    session->gone(session->gone_arg);
+  }
   pthread_mutex_destroy(&session->detail_lock);
   hapi_free(session);
 }

@@ -53,6 +53,9 @@ struct hap_session {
   hap_player *player;      /* borrowed, until stop; NULL: no replay */
   int64_t played_ns;       /* of a replay: of its newest tick */
 
+  void (*gone)(void *arg); /* when it is freed; NULL: nobody wants to know */
+  void *gone_arg;
+
   pthread_mutex_t detail_lock;
   hap_detail detail;
 };

@@ -44,6 +44,7 @@ LAYERS = {
                      "lib/probe", "lib/research"],
     "lib/physics": ["lib/base", "lib/sync", "lib/proximity", "lib/record", *PHYSICS_SIDE],
     "lib/session": ["lib/*"],
+    "lib/scene": ["lib/*", "scenes"],
     "plugins/skeleton": [],
     "plugins/*": ["lib/base", "plugins/common"],
     "scenes": [],
@@ -56,7 +57,8 @@ LAYERS = {
     "tests/*": ["*"],
 }
 ODE_USERS = [folder + "/*" for folder in PHYSICS_SIDE] + [
-    "include/hapode/ode.h", "scenes/*", "examples/*", "tests/*", "bench/*", "tools/*"]
+    "include/hapode/ode.h", "lib/scene/*", "scenes/*", "examples/*", "tests/*", "bench/*",
+    "tools/*"]
 HAPODE_ODE_USERS = ODE_USERS + ["lib/session/*ode*.c"]
 
 MODULES = ("plugins/skeleton/",)  # no part of the library: a heap of their own, no header of lib/
