@@ -51,8 +51,8 @@
 
 /* ---- late ticks ---- */
 #define HAPI_SAFETY_LATE_GAP_S 0.005     /* s */
-#define HAPI_SAFETY_LATE_FEW_SHARE 0.02  /* 1 */
-#define HAPI_SAFETY_LATE_FEW_S 0.02      /* s */
+#define HAPI_SAFETY_LATE_FEW_SHARE 0.03  /* 1 */
+#define HAPI_SAFETY_LATE_FEW_S 0.03      /* s */
 #define HAPI_SAFETY_LATE_GAP_DECAY_S 0.2 /* s */
 #define HAPI_SAFETY_LATE_DOWN_S 0.004    /* s */
 #define HAPI_SAFETY_LATE_SLEW_S 0.0125   /* s */
