@@ -65,6 +65,10 @@ static const program programs[] = {
      "where each integrator holds: stiffness, mass, contacts at once; --only KEY=VALUE/VALUE,...: "
      "of "
      "such points alone, by the names of the table"},
+    {"stopped", bench_stopped,
+     "hapode-run in real time, stopped by signals or beside busy loops, with the virtual device "
+     "and "
+     "a SPIDAR's emulator: force, steps, and what the guard does"},
     {"tick", bench_tick,
      "the haptic loop alone: time of a tick; --scene NAME: of one case with contacts"},
 };

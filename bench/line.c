@@ -17,6 +17,7 @@
 #include "base/histogram.h"
 #include "base/thread.h"
 #include "bench/bench.h"
+#include "bench/child.h"
 #include "device/device.h"
 #include "device/one_effector.h"
 #include "plugins/spidar/spidar.h"
@@ -215,62 +216,22 @@ typedef struct setup {
   const char *model;
   const char *boards;   /* for people */
   line_floor_def floor; /* the same bytes; their time from the first command to the last reply */
-  pid_t emulator;
-  int input; /* its stdin: it ends with us */
+  bench_child emulator;
   char spec[128];
   double pulled_ms;
 } setup;
 
 /* ---- the emulator ---- */
 
-static void run_emulator(const setup *s, int in, int out)
-{
-  char path[4096];
-  ssize_t length = readlink("/proc/self/exe", path, sizeof path - 1);
-  path[length > 0 ? length : 0] = '\0';
-  char *name = strrchr(path, '/');
-  size_t used = name != NULL ? (size_t)(name - path) : 0;
-  (void)snprintf(path + used, sizeof path - used, "/spidar-emulator");
-  dup2(in, STDIN_FILENO);
-  dup2(out, STDOUT_FILENO);
-  execl(path, path, "--model", s->model, "--hand", "hold", "--fifo", "60", (char *)NULL);
-  _exit(127);
-}
-
 static bool start_emulator(setup *s)
 {
-  int in[2];
-  int out[2];
+  const char *const words[] = {"--model", s->model, "--hand", "hold", "--fifo", "60", NULL};
   char line[100] = "";
-  if (pipe(in) != 0 || pipe(out) != 0) {
-    return false;
-  }
-  s->emulator = fork();
-  if (s->emulator == 0) {
-    close(in[1]);
-    run_emulator(s, in[0], out[1]);
-  }
-  close(in[0]);
-  close(out[1]);
-  s->input = in[1];
-  FILE *said = fdopen(out[0], "r");
-  bool good =
-      said != NULL && fgets(line, sizeof line, said) != NULL && strncmp(line, "port: ", 6) == 0;
-  if (said != NULL) {
-    fclose(said);
-  }
+  bool good = bench_child_start("spidar-emulator", words, &s->emulator) &&
+              fgets(line, sizeof line, s->emulator.said) != NULL && strncmp(line, "port: ", 6) == 0;
   line[strcspn(line, "\n")] = '\0';
   (void)snprintf(s->spec, sizeof s->spec, "spidar:%.80s,timeout=5,stall=5", line + 6);
   return good;
-}
-
-static void stop_emulator(const setup *s)
-{
-  close(s->input);
-  if (s->emulator > 0) {
-    (void)kill(s->emulator, SIGTERM);
-    (void)waitpid(s->emulator, NULL, 0);
-  }
 }
 
 /* ---- what is measured ---- */
@@ -319,7 +280,7 @@ static double pull_cable(const setup *s, subject *measured)
 {
   static const char word[] = "unplug\n";
   int64_t begin_ns = hapi_clock_now();
-  if (write(s->input, word, sizeof word - 1) != (ssize_t)sizeof word - 1) {
+  if (write(s->emulator.input, word, sizeof word - 1) != (ssize_t)sizeof word - 1) {
     return -1.0;
   }
   for (int i = 0; i < 1000; ++i) {
@@ -361,7 +322,7 @@ static hap_status setup_measure(bench *b, setup *s, line_figures out[2])
   if (status >= HAP_OK) {
     status = start_emulator(s) ? measure_with(b, s, &lowest, out)
                                : bench_fail(b, HAP_ERROR_SYSTEM, "line: no spidar-emulator");
-    stop_emulator(s);
+    (void)bench_child_finish(&s->emulator, SIGTERM);
   }
   line_floor_stop(&lowest);
   return status;
