@@ -69,6 +69,13 @@ TEST(no_contact_is_pressed_in_faster_than_10_m_a_second)
 
 /* ---- a plausible device ---- */
 
+/* In time; steps of 20 ms. */
+static uint32_t coupling_read(void)
+{
+  const hapi_coupling_late late = {.elapsed = T};
+  return hapi_coupling_read(&f.tick.pointers, f.now_ns, T, &late, 0.02);
+}
+
 static hapi_pointer *coupling_pointer(void)
 {
   static const hapi_tool_hull hull;
@@ -77,7 +84,7 @@ static hapi_pointer *coupling_pointer(void)
   p->shape.hull = &hull;
   p->device.speed_limit = 10.0;
   f.tick.pointers.high = 1;
-  CHECK(hapi_coupling_read(&f.tick.pointers, f.now_ns, T, T, 0.02) == 0);
+  CHECK(coupling_read() == 0);
   return p;
 }
 
@@ -91,9 +98,9 @@ TEST(a_device_that_turns_by_more_than_a_tenth_in_a_tick_has_jumped)
 {
   hapi_pointer *p = coupling_pointer();
   turn_to(p, 0.095);
-  CHECK(hapi_coupling_read(&f.tick.pointers, f.now_ns, T, T, 0.02) == 0 && !p->device.jumped);
+  CHECK(coupling_read() == 0 && !p->device.jumped);
   turn_to(p, 0.2);
-  CHECK(hapi_coupling_read(&f.tick.pointers, f.now_ns, T, T, 0.02) == 0 && p->device.jumped);
+  CHECK(coupling_read() == 0 && p->device.jumped);
 }
 
 /* In this tick it is known; 10 ms, and two steps until a model of the new place has come. */
@@ -102,10 +109,10 @@ TEST(contacts_that_come_after_a_jump_begin_anew_for_10_ms_and_two_steps)
   hapi_pointer *p = coupling_pointer();
   int ticks = 0;
   p->device.pose.position[0] = 0.02;
-  (void)hapi_coupling_read(&f.tick.pointers, f.now_ns, T, T, 0.02);
+  (void)coupling_read();
   CHECK(p->device.jumped);
   for (; p->device.jump_s > 0.5 * T && ticks < 1000; ++ticks) {
-    (void)hapi_coupling_read(&f.tick.pointers, f.now_ns, T, T, 0.02);
+    (void)coupling_read();
   }
   CHECK_SAY(ticks == 50, "%d ticks", ticks);
 }
@@ -114,10 +121,10 @@ TEST(a_speed_that_no_wrist_has_is_no_speed)
 {
   hapi_pointer *p = coupling_pointer();
   hapi_v3_set(p->device.twist.angular, 0.0, 99.0, 0.0);
-  (void)hapi_coupling_read(&f.tick.pointers, f.now_ns, T, T, 0.02);
+  (void)coupling_read();
   CHECK_NEAR(p->twist.angular[1], 99.0, 1e-9);
   hapi_v3_set(p->device.twist.angular, 0.0, 101.0, 0.0);
-  (void)hapi_coupling_read(&f.tick.pointers, f.now_ns, T, T, 0.02);
+  (void)coupling_read();
   CHECK(p->twist.angular[1] == 0.0);
 }
 
@@ -129,7 +136,7 @@ TEST(a_coordinate_or_a_speed_of_more_than_a_million_is_an_error)
       double *value = i < 3 ? &p->device.pose.position[i] : &p->device.twist.linear[i - 3];
       p->device.speed_limit = 0.0;
       *value = beyond != 0 ? 1.01e6 : 0.99e6;
-      CHECK(hapi_coupling_read(&f.tick.pointers, f.now_ns, T, T, 0.02) == (beyond != 0 ? 1 : 0));
+      CHECK(coupling_read() == (beyond != 0 ? 1 : 0));
     }
   }
 }
