@@ -491,7 +491,7 @@ TEST(an_emergency_zeroes_a_device_whose_zero_hangs_last)
   atomic_store(&pair[1].holds, 1);
   pthread_t second;
   REQUIRE(pthread_create(&second, NULL, zero_all, NULL) == 0);
-  CHECK(await_value(&pair[1].holds, 0)); /* though the one before it in the table hangs */
+  CHECK(await_value(&pair[1].holds, 0));   /* though the one before it in the table hangs */
   CHECK(await_value(&pair[0].zeroing, 2)); /* and it is zeroed itself, last */
   CHECK(!hapi_emergency_remove(&stuck_ops, &pair[0])); /* not for ever */
   CHECK(hapi_emergency_remove(&stuck_ops, &pair[1]) || true);
