@@ -15,7 +15,8 @@ typedef struct bench_child {
   FILE *said; /* its stdout; NULL: none */
 } bench_child;
 
-/* Starts the program of that name beside this one. words: what follows its name, NULL at the end. */
+/* Starts the program of that name beside this one. words: what follows its name, NULL at the end.
+ */
 bool bench_child_start(const char *name, const char *const words[], bench_child *out);
 
 /* Ends it, if it has not ended, and waits for it. True: it ended by itself with exit 0. A zeroed

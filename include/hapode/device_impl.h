@@ -37,7 +37,7 @@ typedef enum hap_device_pacing {
 
 /* What an end effector measures. It has a size, set by the library, and may grow at its end. */
 typedef struct hap_device_input {
-  uint32_t size;
+  uint32_t size;    /* bytes that there is room for */
   uint32_t buttons; /* bit 0 is the first one */
   hap_pose pose;    /* in the device's frame; a device of dof 3 gives a constant quaternion */
   hap_twist twist;
@@ -48,7 +48,7 @@ typedef struct hap_device_input {
 /* What an end effector shall do, or does. It has a size, set by the library, and may grow at its
  * end. */
 typedef struct hap_device_output {
-  uint32_t size;
+  uint32_t size;                    /* bytes that are filled in, or that there is room for */
   uint32_t leds;                    /* bit 0 is the first one */
   hap_wrench wrench;                /* on the hand, in the device's frame */
   double axis_forces[HAP_AXES_MAX]; /* on the hand: positive ones open a gripper */

@@ -28,7 +28,7 @@ typedef enum hap_force_kind {
 
 /* Whose axes and origin are meant. Values are never renumbered. */
 typedef enum hap_force_frame {
-  HAP_FORCE_WORLD = 0,
+  HAP_FORCE_WORLD = 0,  /* the axes of the world */
   HAP_FORCE_POINTER = 1 /* the axes of the hand: CONSTANT and VIBRATION turn with it */
 } hap_force_frame;
 
@@ -55,7 +55,7 @@ typedef struct hap_force_wave {
   double sample_hz;      /* Hz, 1e-3..1e6, default 1000 */
 } hap_force_wave;
 
-#define HAP_FORCE_FOR_EVER 1e9
+#define HAP_FORCE_FOR_EVER 1e9     /* s, in place of a hold_s: it does not end */
 #define HAP_FORCE_SAMPLES_MAX 1024 /* of a vibration */
 #define HAP_FORCES_MAX 16          /* of a pointer */
 
@@ -93,7 +93,7 @@ typedef struct hap_force_def {
   double max_power;
 } hap_force_def;
 
-#define HAP_FORCE_POWER_AUTO (-1.0)
+#define HAP_FORCE_POWER_AUTO (-1.0) /* in place of a max_power: by the kind of the force */
 
 /* Index and serial number in one: the id of a removed force is never valid again. 0 is none.
  * Final. */

@@ -136,13 +136,13 @@ HAP_NODISCARD HAP_API hap_status hap_scene_add_geom(hap_scene *scene, const hap_
 
 /* Kind of a joint. Values are never renumbered. */
 typedef enum hap_joint_kind {
-  HAP_JOINT_BALL = 0,
+  HAP_JOINT_BALL = 0,      /* turns about any axis */
   HAP_JOINT_HINGE = 1,     /* turns about axis 0 */
   HAP_JOINT_SLIDER = 2,    /* slides along axis 0 */
   HAP_JOINT_UNIVERSAL = 3, /* turns about axis 0 of body a and axis 1 of body b */
   HAP_JOINT_HINGE2 = 4,    /* a wheel: steers about axis 0, rolls about axis 1 */
-  HAP_JOINT_FIXED = 5,
-  HAP_JOINT_OTHER = 6 /* of a built-in scene; cannot be added */
+  HAP_JOINT_FIXED = 5,     /* holds the bodies as they are */
+  HAP_JOINT_OTHER = 6      /* of a built-in scene; cannot be added */
 } hap_joint_kind;
 
 /* A joint between two bodies as they are. It has a size and may grow at its end. */
@@ -170,21 +170,24 @@ HAP_API void hap_joint_def_init(hap_joint_def *def, size_t size_of_def);
 HAP_NODISCARD HAP_API hap_status hap_scene_add_joint(hap_scene *scene, const hap_joint_def *def,
                                                      uint32_t *out_joint, hap_detail *detail);
 
-/* [scene] Takes a body with its geoms and joints away, a geom that never moves, a joint. What a
- * hand feels of it ends. HAP_ERROR_NOT_FOUND: there is none of that number. HAP_ERROR_STATE: the
- * geom belongs to a body. HAP_ERROR_THREAD. */
+/* [scene] Takes a body with its geoms and joints away. What a hand feels of it ends.
+ * HAP_ERROR_NOT_FOUND: there is none of that number. HAP_ERROR_THREAD. */
 HAP_API hap_status hap_scene_remove_body(hap_scene *scene, uint32_t body);
+
+/* [scene] The same of a geom that never moves. HAP_ERROR_STATE: it belongs to a body. */
 HAP_API hap_status hap_scene_remove_geom(hap_scene *scene, uint32_t geom);
+
+/* [scene] The same of a joint. */
 HAP_API hap_status hap_scene_remove_joint(hap_scene *scene, uint32_t joint);
 
 /* ---- reading it ---- */
 
-/* How many numbers were given out. */
+/* How many numbers were given out. Its size goes with the call; it may grow at its end. */
 typedef struct hap_scene_counts {
-  uint32_t bodies;
-  uint32_t geoms;
-  uint32_t joints;
-  uint32_t hands; /* that a built-in scene was made for */
+  uint32_t bodies; /* with those that were removed, also below */
+  uint32_t geoms;  /* of bodies, and those that never move */
+  uint32_t joints; /* between bodies, or a body and the world */
+  uint32_t hands;  /* that a built-in scene was made for */
 } hap_scene_counts;
 
 /* [scene] size_of_out: sizeof *out of the caller's build. */
@@ -250,9 +253,11 @@ typedef struct hap_scene_joint {
 HAP_API hap_status hap_scene_get_joint(const hap_scene *scene, uint32_t joint, hap_scene_joint *out,
                                        size_t size_of_out);
 
-/* [scene] Number of the geom or body that hap_touch, hap_event or hap_body_contact tells.
- * HAP_SCENE_WORLD: it is none of this scene. */
+/* [scene] Number of the geom that hap_touch, hap_event or hap_body_contact tells. HAP_SCENE_WORLD:
+ * it is none of this scene. */
 HAP_API uint32_t hap_scene_find_geom(const hap_scene *scene, const void *geom);
+
+/* [scene] The same of a body. */
 HAP_API uint32_t hap_scene_find_body(const hap_scene *scene, const void *body);
 
 /* ---- a session over it ---- */

@@ -132,13 +132,13 @@ static void way_follow(hapi_pointer *p)
 static double explained_by_motion(const hapi_pointer *p, double period)
 {
   const hapi_guard_pointer *g = &p->guard;
-  const hapi_explained *e = &g->explained;
-  const hapi_explained *before = &g->before;
+  const hapi_explained *e = &g->change.explained;
+  const hapi_explained *before = &g->change.before;
   double speed = hapi_v3_norm(p->device.twist.linear);
   double change[3];
-  bool doubted = g->doubted || p->belief.doubted;
+  bool doubted = g->change.doubted || p->belief.doubted;
   double way = hapi_v3_norm(g->moved);
-  hapi_v3_sub(p->device.twist.linear, g->velocity, change);
+  hapi_v3_sub(p->device.twist.linear, g->change.velocity, change);
   double faster = hapi_v3_norm(change);
   if (p->device.jumped) {
     way = faster = 0.0;
@@ -155,7 +155,7 @@ static double explained_by_motion(const hapi_pointer *p, double period)
   speed *= p->device.motion_scale;
   if (p->frame.used) { /* what its base moves it is no doubt about the device */
     way += hapi_v3_norm(p->frame.step) + p->shape.extent * hapi_v3_norm(p->frame.turned);
-    hapi_v3_sub(p->frame.carries.linear, g->carried, change);
+    hapi_v3_sub(p->frame.carries.linear, g->change.carried, change);
     faster += hapi_v3_norm(change) + p->shape.extent * hapi_v3_norm(p->frame.carries.angular);
     speed += hapi_v3_norm(p->frame.carries.linear);
   }
@@ -191,22 +191,22 @@ static void limit_unexplained(const hapi_tick_facts *facts, hapi_pointer *p)
     double slow = period / HAPI_SAFETY_UNEXPLAINED_S;
     double explained = explained_by_motion(p, period);
     if (!(p->belief.doubt_s > 0.0)) {
-      vector_fall(g->came.force, p->device.wrench.force);
-      vector_fall(g->came.torque, p->device.wrench.torque);
+      vector_fall(g->change.came.force, p->device.wrench.force);
+      vector_fall(g->change.came.torque, p->device.wrench.torque);
     }
-    bool force = vector_slew(g->came.force, explained + slow * p->device.limits.max_force,
+    bool force = vector_slew(g->change.came.force, explained + slow * p->device.limits.max_force,
                              p->device.wrench.force);
     bool torque = vector_slew(
-        g->came.torque,
+        g->change.came.torque,
         hapi_max(HAPI_SAFETY_HANDLE, p->shape.extent / p->device.motion_scale) * explained +
             slow * p->device.limits.max_torque,
         p->device.wrench.torque);
     g->flags |= force || torque ? HAP_GUARD_INPUT : 0;
   }
-  g->came = p->device.wrench;
-  g->doubted = p->belief.doubted;
-  hapi_v3_copy(p->device.twist.linear, g->velocity);
-  hapi_v3_copy(p->frame.carries.linear, g->carried);
+  g->change.came = p->device.wrench;
+  g->change.doubted = p->belief.doubted;
+  hapi_v3_copy(p->device.twist.linear, g->change.velocity);
+  hapi_v3_copy(p->frame.carries.linear, g->change.carried);
 }
 
 /* What the device shall get before the limits. */
@@ -224,7 +224,7 @@ static void pointer_want(const hapi_guard *guard, const hapi_tick_facts *facts, 
     bool fades = guard->latch.fault == HAP_FAULT_LATE;
     g->flags = HAP_GUARD_FAULT;
     g->placed = false; /* the pose may be none */
-    memset(&g->came, 0, sizeof g->came);
+    memset(&g->change.came, 0, sizeof g->change.came);
     hapi_v3_scale(fades ? guard->late.fade : 0.0, g->written.force, p->device.wrench.force);
     hapi_v3_scale(fades ? guard->late.fade : 0.0, g->written.torque, p->device.wrench.torque);
     memset(&p->declared.given, 0, sizeof p->declared.given); /* it is in what was written */

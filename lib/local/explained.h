@@ -29,8 +29,8 @@ static inline double hapi_sum_of_sizes(const double v[3])
 
 static inline void hapi_explained_begin(hapi_pointer *p)
 {
-  p->guard.before = p->guard.explained;
-  memset(&p->guard.explained, 0, sizeof p->guard.explained);
+  p->guard.change.before = p->guard.change.explained;
+  memset(&p->guard.change.explained, 0, sizeof p->guard.change.explained);
 }
 
 /* Of a contact that pushes; its damper begins with a depth above 0. body: after its step; NULL: it
@@ -38,7 +38,7 @@ static inline void hapi_explained_begin(hapi_pointer *p)
 static inline void hapi_contact_explain(hapi_pointer *p, const hapi_local_contact *c, double depth,
                                         const hapi_local_body *body, double period)
 {
-  hapi_explained *e = &p->guard.explained;
+  hapi_explained *e = &p->guard.change.explained;
   double k = c->weight * (p->rigid ? p->coupling.stiffness : hapi_touch_stiffness(c, p));
   double d = !(depth > 0.0)
                  ? 0.0

@@ -213,6 +213,16 @@ typedef struct hapi_explained {
   double world;     /* N, by motion of the surfaces, and by contacts that come in slowly */
 } hapi_explained;
 
+/* The bound on changes of a force: what is known of the last tick. Device frame and units. */
+typedef struct hapi_change_bound {
+  double velocity[3];       /* m/s, of the device */
+  double carried[3];        /* m/s, world: of its base */
+  bool doubted;             /* the device */
+  hapi_explained explained; /* of this tick, and of the one before: */
+  hapi_explained before;
+  hap_wrench came; /* of what is wanted: what the bound has let in */
+} hapi_change_bound;
+
 /* What the guard keeps of a pointer. Device frame and units where nothing else is said; zeroed: a
  * pointer that has just come. */
 typedef struct hapi_guard_pointer {
@@ -222,15 +232,10 @@ typedef struct hapi_guard_pointer {
   bool placed;        /* position and moved are of the device as it is now */
   double position[3]; /* at the last tick */
   double quat[4];
-  double moved[3];          /* since the tick before */
-  double turned[3];         /* rad, likewise, of a device that gives torque */
-  double velocity[3];       /* m/s, of the device at the last tick */
-  double carried[3];        /* m/s, world: of its base at the last tick */
-  bool doubted;             /* the device, at the last tick */
-  hapi_explained explained; /* of this tick, and of the one before: */
-  hapi_explained before;
+  double moved[3];  /* since the tick before */
+  double turned[3]; /* rad, likewise, of a device that gives torque */
+  hapi_change_bound change;
   hap_wrench wanted;  /* before the guard */
-  hap_wrench came;    /* of it, what the bound on changes has let in */
   hap_wrench written; /* at the last tick; in force until the next write */
   hap_wrench contact; /* of that, without what was declared */
   uint32_t flags;     /* hap_guard_flag, of the last tick */

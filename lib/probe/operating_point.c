@@ -12,7 +12,8 @@
 /* Testing simulations for bodies that a pointer may touch and that the loop of model CONTACT cannot
  * own: jointed ones, and ones on ground that only ODE's collider knows. Of each the response to a
  * wrench at its centre of mass, 6x6, about the operating point: every probe has the mean wrench of
- * the last interval, so that contacts are loaded as they really are. The bodies that the loop owns are not there in a probe: their contacts are the loop's. */
+ * the last interval, so that contacts are loaded as they really are. The bodies that the loop owns
+ * are not there in a probe: their contacts are the loop's. */
 
 /* Of the weight: within the plateau between rounding and another set of active contacts. */
 #define PROBE_SHARE 0.01

@@ -143,8 +143,7 @@ hap_status hap_scene_session(hap_scene *scene, const hap_session_def *def, hap_s
   ode.user = scene;
   HAPI_TRY(hap_session_create(def, &ode, out, detail));
   scene->session = *out;
-  (*out)->gone = session_gone;
-  (*out)->gone_arg = scene;
+  (*out)->gone = (hapi_session_gone){session_gone, scene};
   return HAP_OK;
 }
 

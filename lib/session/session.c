@@ -94,8 +94,8 @@ void hapi_session_free(hap_session *session)
     hapi_recorder_destroy(session->recorder);
     hapi_textures_destroy(session->textures);
   }
-  if (session->gone != NULL) {
-    session->gone(session->gone_arg);
+  if (session->gone.tell != NULL) {
+    session->gone.tell(session->gone.arg);
   }
   pthread_mutex_destroy(&session->detail_lock);
   hapi_free(session);

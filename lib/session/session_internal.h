@@ -22,6 +22,12 @@
 
 #define HAPI_POINTER_COOKIE 0x48505431u /* recordings have it */
 
+/* Who wants to know when a session is freed; NULL: nobody. */
+typedef struct hapi_session_gone {
+  void (*tell)(void *arg);
+  void *arg;
+} hapi_session_gone;
+
 struct hap_session {
   hap_session_def def; /* its expert and research are the next two */
   hap_expert_def expert;
@@ -53,8 +59,7 @@ struct hap_session {
   hap_player *player;      /* borrowed, until stop; NULL: no replay */
   int64_t played_ns;       /* of a replay: of its newest tick */
 
-  void (*gone)(void *arg); /* when it is freed; NULL: nobody wants to know */
-  void *gone_arg;
+  hapi_session_gone gone;
 
   pthread_mutex_t detail_lock;
   hap_detail detail;
