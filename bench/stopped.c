@@ -243,13 +243,13 @@ static void stopped_judge(bench *b, FILE *csv, const stopped_device *device, con
 
 static hap_status stopped_device_run(bench *b, FILE *csv, const stopped_device *device)
 {
-  stopped_result still;
+  stopped_result still = {0};
   hap_status status = HAP_OK;
   size_t count = b->quick ? 2 : BENCH_COUNT(stopped_defs);
   for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
     const stopped_def *def = &stopped_defs[i];
     bool reference = def->stop_ms == 0 && def->burners == 0;
-    stopped_result now;
+    stopped_result now = {0};
     status = stopped_run(b, device, def, reference ? &still : &now);
     if (status >= HAP_OK) {
       stopped_judge(b, csv, device, def, &still, reference ? &still : &now);
