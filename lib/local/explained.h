@@ -51,6 +51,7 @@ static inline void hapi_contact_explain(hapi_pointer *p, const hapi_local_contac
   }
   if (c->feel.special) { /* what a texture does on the hand's way */
     e->world += k * (c->feel.lifted + fmax(depth, 0.0) * c->feel.turned);
+    e->world += d * c->feel.turned * hapi_sum_of_sizes(p->twist.linear);
   }
   e->damping += d;
   if (c->ramp.share < 1.0) {
