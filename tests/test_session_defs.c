@@ -129,8 +129,6 @@ static const struct {
     REAL_FIELD(expert, tick_share, (double)NAN),
     REAL_FIELD(expert, physics_share, -1.0),
     REAL_FIELD(expert, physics_share, (double)INFINITY),
-    WHOLE_FIELD(expert, max_edge_probes, -1),
-    WHOLE_FIELD(expert, max_edge_probes, 1025),
     WHOLE_FIELD(expert, iterations, -1),
     WHOLE_FIELD(expert, iterations, 10001),
     WHOLE_FIELD(def, max_bodies, 0),

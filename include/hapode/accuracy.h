@@ -59,7 +59,6 @@ typedef struct hap_accuracy_info {
   double contact_hz;    /* Hz */
   int32_t max_sweeps;   /* of a solve; 0: until it is solved, or row_updates are made */
   int32_t range_hops;   /* HAP_RANGE_ALL: as far as max_bodies allows */
-  int32_t edge_probes;  /* 0: bodies at the border of the range take none */
   int32_t iterations;   /* of QuickStep, in the newest physics step */
   uint32_t shapes;      /* 1: shapes at every tick; 0: planes, where effect SHAPE is auto */
   uint32_t row_updates; /* the most that a solve of a tick may make */

@@ -42,8 +42,6 @@ typedef struct hap_expert_def {
    * count as one. Bodies beyond answer with their mass, and are held by as much of the last push as
    * the world took up */
   int32_t range_hops;
-  /* 0..1024, without effect: bodies at the border of the range take no testing simulations */
-  int32_t max_edge_probes;
   /* of QuickStep in all steps of physics, 1..10000 [the world's]. 0: the world's. At another
    * accuracy in proportion */
   int32_t iterations;

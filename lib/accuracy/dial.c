@@ -282,7 +282,6 @@ void hapi_dial_tell(const hapi_dial *dial, const hapi_settings *s, hap_accuracy_
   out->contact_hz = s->contact_hz;
   out->max_sweeps = (int32_t)s->max_sweeps;
   out->range_hops = s->range_hops;
-  out->edge_probes = 0;
   out->shapes = s->shapes;
   out->row_updates = s->row_updates;
   out->reuse = s->reuse;

@@ -68,8 +68,7 @@ typedef struct hapi_file_info {
   int32_t max_pointers;
   int32_t impulse_pose;
   int32_t probe;
-  int32_t max_edge_probes;
-  int32_t unused; /* 0 */
+  int32_t unused[2]; /* 0 */
   int32_t max_hull_points;
   int32_t guard;
   uint32_t joined_size; /* of hapi_joined */

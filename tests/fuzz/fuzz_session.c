@@ -85,7 +85,7 @@ static void edit_session(source *s, session_defs *defs)
                                &def->rt_priority,
                                &research->physics_latency_ticks,
                                &expert->trace_rows,
-                               &expert->max_edge_probes,
+                               &def->max_steps_per_update,
                                &expert->max_hull_points};
   uint8_t field = take_byte(s) % 16;
   if (field < 3) {
@@ -181,8 +181,7 @@ static void check_def(const hap_session_def *def)
       {def->rt_priority, 0, 98},
       {research->physics_latency_ticks, -1, def->haptic_hz / def->physics_hz + 1e-6},
       {expert->trace_rows, 0, 1048576},
-      {expert->max_edge_probes, expert->max_edge_probes == HAP_BY_ACCURACY ? HAP_BY_ACCURACY : 0,
-       1024},
+      {def->max_steps_per_update, 1, 64},
       {expert->max_hull_points, 0, 1048576},
       {def->model, HAP_MODEL_SINGLE, HAP_MODEL_CONTACT},
       {research->impulse_pose, HAP_IMPULSE_INTERPOLATED, HAP_IMPULSE_HELD},
