@@ -5,13 +5,7 @@
 
 #include "tests/tap.h"
 
-#include "tests/contact_world.h"
-
-#define HZ 20.0 /* of create */
-#define ERP 0.2
-#define CFM 1e-3
-#define DAMPING 0.02
-#define PUSH 3.0 /* N */
+#include "tests/plain_steps.h"
 
 typedef struct rate {
   double hz;
@@ -22,120 +16,23 @@ static const rate plan[] = {{20.0, 1}, {80.0, 31}, {5.0, 3}, {62.5, 20}, {20.0, 
 
 #define RATES (sizeof plan / sizeof plan[0])
 
-/* A cube that is pushed over a soft floor, and a bar that swings. */
-typedef struct things {
-  dBodyID cube;
-  dBodyID bar;
-} things;
-
-static void things_build(dWorldID world, dSpaceID space, things *out)
+/* m. converts: ERP, CFM and damping are taken as meant for a step of the rate at create. */
+static double off_plain(const plain_things *mine, bool converts)
 {
-  (void)dCreatePlane(space, 0.0, 0.0, 1.0, 0.0);
-  out->cube = ode_box(world, space, 0.5, AT(0.1, 0.1, 0.1), AT(0.0, 0.0, 0.05));
-  out->bar = ode_box(world, space, 0.5, AT(0.2, 0.02, 0.02), AT(0.1, 2.0, 1.0));
-  dJointID hinge = dJointCreateHinge(world, NULL);
-  dJointAttach(hinge, out->bar, NULL);
-  dJointSetHingeAnchor(hinge, 0.0, 2.0, 1.0);
-  dJointSetHingeAxis(hinge, 0.0, 1.0, 0.0);
-  dBodySetLinearDamping(out->bar, DAMPING);
-  dBodySetLinearDampingThreshold(out->bar, 0.0);
-}
-
-static dSurfaceParameters soft_surface(double erp, double cfm)
-{
-  return (dSurfaceParameters){.mode = dContactApprox1 | dContactSoftERP | dContactSoftCFM,
-                              .mu = 0.2,
-                              .soft_erp = erp,
-                              .soft_cfm = cfm};
-}
-
-/* The same spring and damper in a step that is that much as long. */
-static void spring_convert(double ratio, double *io_erp, double *io_cfm)
-{
-  double part = ratio * *io_erp + 1.0 - *io_erp;
-  *io_erp *= ratio / part;
-  *io_cfm /= part;
-}
-
-typedef struct plain_loop {
-  dWorldID world;
-  dSpaceID space;
-  dJointGroupID contacts;
-  dSurfaceParameters surface;
-  things t;
-} plain_loop;
-
-static void plain_near(void *data, dGeomID a, dGeomID b)
-{
-  plain_loop *p = data;
-  dContact contacts[8];
-  int count = dCollide(a, b, 8, &contacts[0].geom, sizeof contacts[0]);
-  for (int i = 0; i < count; ++i) {
-    contacts[i].surface = p->surface;
-    dJointID joint = dJointCreateContact(p->world, p->contacts, &contacts[i]);
-    dJointAttach(joint, dGeomGetBody(a), dGeomGetBody(b));
-  }
-}
-
-static void plain_steps(plain_loop *p, const rate *r)
-{
-  double ratio = HZ / r->hz;
-  double erp = ERP;
-  double cfm = CFM;
-  double world_erp = ERP;
-  double world_cfm = 1e-12;
-  spring_convert(ratio, &erp, &cfm);
-  spring_convert(ratio, &world_erp, &world_cfm);
-  p->surface = soft_surface(erp, cfm);
-  dWorldSetERP(p->world, world_erp);
-  dWorldSetCFM(p->world, world_cfm);
-  dBodySetLinearDamping(p->t.bar, 1.0 - pow(1.0 - DAMPING, ratio));
-  for (int i = 0; i < r->steps; ++i) {
-    dBodyAddForce(p->t.cube, PUSH, 0.0, 0.0);
-    dJointGroupEmpty(p->contacts);
-    dSpaceCollide(p->space, p, plain_near);
-    dWorldQuickStep(p->world, 1.0 / r->hz);
-  }
-}
-
-/* m, of cube and bar together, from where a plain loop has them. converts: it takes ERP, CFM and
- * damping as meant for a step of the rate at create. */
-static double off_plain(const contact_world *w, const things *mine, bool converts)
-{
-  plain_loop p = {.contacts = dJointGroupCreate(0)};
-  double off = 0.0;
-  ode_world_make(9.81, &p.world, &p.space);
-  dWorldSetContactSurfaceLayer(p.world, dWorldGetContactSurfaceLayer(w->world));
-  dWorldSetQuickStepNumIterations(p.world, dWorldGetQuickStepNumIterations(w->world));
-  things_build(p.world, p.space, &p.t);
+  plain_loop p;
+  plain_open(&p);
   for (size_t i = 0; i < RATES; ++i) {
-    const rate same = {converts ? plan[i].hz : HZ, plan[i].steps};
-    plain_steps(&p, &same);
+    plain_run(&p, plan[i].steps, plan[i].hz, converts ? PLAIN_HZ : plan[i].hz);
   }
-  const dBodyID right[2] = {p.t.cube, p.t.bar};
-  const dBodyID have[2] = {mine->cube, mine->bar};
-  for (int i = 0; i < 2; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      off = fmax(off, fabs(dBodyGetPosition(have[i])[k] - dBodyGetPosition(right[i])[k]));
-    }
-  }
-  dJointGroupDestroy(p.contacts);
-  ode_world_end(NULL, p.world, p.space);
+  double off = plain_off(&p, mine);
+  plain_close(&p);
   return off;
 }
 
 TEST(steps_of_any_rate_are_those_of_ode)
 {
-  contact_world *w = cw_new(9.81);
-  things t;
-  w->surface = soft_surface(ERP, CFM);
-  dWorldSetQuickStepNumIterations(w->world, 1000); /* else its order of rows shows */
-  things_build(w->world, w->space, &t);
-  w->bodies[w->body_count++] = t.cube;
-  w->bodies[w->body_count++] = t.bar;
-  w->user.force[0] = PUSH;
-  w->expert.iterations = 0;
-  w->expert.effects_off = HAP_EFFECT_BIT(HAP_EFFECT_RANGE); /* all of it is ODE's */
+  plain_things t;
+  contact_world *w = plain_session(&t);
   cw_start(w, 0.0, 100.0, 0.0);
   int64_t end_ns = 0;
   uint64_t steps = 0;
@@ -153,9 +50,9 @@ TEST(steps_of_any_rate_are_those_of_ode)
     steps += (uint64_t)plan[i].steps;
     CHECK(cw_stats(w).physics.steps == steps);
   }
-  double off = off_plain(w, &t, true);
-  double other = off_plain(w, &t, false);
-  printf("# off by %.3g m; %.3g m from steps of one rate\n", off, other);
+  double off = off_plain(&t, true);
+  double other = off_plain(&t, false);
+  printf("# off by %.3g m; %.3g m where nothing is converted\n", off, other);
   CHECK(off <= 1e-5); /* on a way of 14 m */
   CHECK(other > 1e-3);
 }
@@ -222,7 +119,7 @@ TEST(rates_are_checked)
   CHECK(hap_session_stop(w->session) == HAP_OK);
   CHECK(hap_session_start(w->session) >= HAP_OK);
   CHECK(hap_session_advance(w->session, 1001) == HAP_OK);
-  CHECK(cw_stats(w).physics.steps == (uint64_t)HZ);
+  CHECK(cw_stats(w).physics.steps == (uint64_t)PLAIN_HZ);
 }
 
 /* Steps a second of frame time, whatever the frames. */

@@ -90,72 +90,54 @@ hap_status hap_scene_get_body(const hap_scene *scene, uint32_t number, hap_scene
   return value_give(&value, sizeof value, out, size_of_out);
 }
 
-static void hinge_read(dJointID joint, hap_scene_joint *out)
-{
-  dVector3 v;
-  dJointGetHingeAnchor(joint, v);
-  hapi_v3_copy(v, out->anchor);
-  dJointGetHingeAxis(joint, v);
-  hapi_v3_copy(v, out->axis[0]);
-  out->position[0] = dJointGetHingeAngle(joint);
-  out->rate[0] = dJointGetHingeAngleRate(joint);
-}
+/* What ODE tells of each kind of joint; NULL: it has none. */
+typedef struct joint_reader {
+  void (*anchor)(dJointID joint, dVector3 out);
+  void (*axis[2])(dJointID joint, dVector3 out);
+  dReal (*position[2])(dJointID joint);
+  dReal (*rate[2])(dJointID joint);
+} joint_reader;
 
-static void slider_read(dJointID joint, hap_scene_joint *out)
-{
-  dVector3 v;
-  dJointGetSliderAxis(joint, v);
-  hapi_v3_copy(v, out->axis[0]);
-  out->position[0] = dJointGetSliderPosition(joint);
-  out->rate[0] = dJointGetSliderPositionRate(joint);
-}
+static const joint_reader joint_readers[] = {
+    [HAP_JOINT_BALL] = {.anchor = dJointGetBallAnchor},
+    [HAP_JOINT_HINGE] = {dJointGetHingeAnchor,
+                         {dJointGetHingeAxis},
+                         {dJointGetHingeAngle},
+                         {dJointGetHingeAngleRate}},
+    [HAP_JOINT_SLIDER] = {NULL,
+                          {dJointGetSliderAxis},
+                          {dJointGetSliderPosition},
+                          {dJointGetSliderPositionRate}},
+    [HAP_JOINT_UNIVERSAL] = {dJointGetUniversalAnchor,
+                             {dJointGetUniversalAxis1, dJointGetUniversalAxis2},
+                             {dJointGetUniversalAngle1, dJointGetUniversalAngle2},
+                             {dJointGetUniversalAngle1Rate, dJointGetUniversalAngle2Rate}},
+    [HAP_JOINT_HINGE2] = {dJointGetHinge2Anchor,
+                          {dJointGetHinge2Axis1, dJointGetHinge2Axis2},
+                          {dJointGetHinge2Angle1, dJointGetHinge2Angle2},
+                          {dJointGetHinge2Angle1Rate, dJointGetHinge2Angle2Rate}},
+    [HAP_JOINT_FIXED] = {NULL},
+    [HAP_JOINT_OTHER] = {NULL},
+};
 
-static void universal_read(dJointID joint, hap_scene_joint *out)
+static void joint_read(const joint_reader *reader, dJointID joint, hap_scene_joint *out)
 {
   dVector3 v;
-  dJointGetUniversalAnchor(joint, v);
-  hapi_v3_copy(v, out->anchor);
-  dJointGetUniversalAxis1(joint, v);
-  hapi_v3_copy(v, out->axis[0]);
-  dJointGetUniversalAxis2(joint, v);
-  hapi_v3_copy(v, out->axis[1]);
-  out->position[0] = dJointGetUniversalAngle1(joint);
-  out->position[1] = dJointGetUniversalAngle2(joint);
-  out->rate[0] = dJointGetUniversalAngle1Rate(joint);
-  out->rate[1] = dJointGetUniversalAngle2Rate(joint);
-}
-
-static void hinge2_read(dJointID joint, hap_scene_joint *out)
-{
-  dVector3 v;
-  dJointGetHinge2Anchor(joint, v);
-  hapi_v3_copy(v, out->anchor);
-  dJointGetHinge2Axis1(joint, v);
-  hapi_v3_copy(v, out->axis[0]);
-  dJointGetHinge2Axis2(joint, v);
-  hapi_v3_copy(v, out->axis[1]);
-  out->position[0] = dJointGetHinge2Angle1(joint);
-  out->position[1] = dJointGetHinge2Angle2(joint);
-  out->rate[0] = dJointGetHinge2Angle1Rate(joint);
-  out->rate[1] = dJointGetHinge2Angle2Rate(joint);
-}
-
-static void ball_read(dJointID joint, hap_scene_joint *out)
-{
-  dVector3 v;
-  dJointGetBallAnchor(joint, v);
-  hapi_v3_copy(v, out->anchor);
+  if (reader->anchor != NULL) {
+    reader->anchor(joint, v);
+    hapi_v3_copy(v, out->anchor);
+  }
+  for (int i = 0; i < 2 && reader->axis[i] != NULL; ++i) {
+    reader->axis[i](joint, v);
+    hapi_v3_copy(v, out->axis[i]);
+    out->position[i] = reader->position[i](joint);
+    out->rate[i] = reader->rate[i](joint);
+  }
 }
 
 hap_status hap_scene_get_joint(const hap_scene *scene, uint32_t number, hap_scene_joint *out,
                                size_t size_of_out)
 {
-  static void (*const readers[])(dJointID joint, hap_scene_joint * out) = {
-      [HAP_JOINT_BALL] = ball_read,     [HAP_JOINT_HINGE] = hinge_read,
-      [HAP_JOINT_SLIDER] = slider_read, [HAP_JOINT_UNIVERSAL] = universal_read,
-      [HAP_JOINT_HINGE2] = hinge2_read, [HAP_JOINT_FIXED] = NULL,
-      [HAP_JOINT_OTHER] = NULL,
-  };
   const hapi_scene_joint *joint = scene != NULL ? hapi_scene_joint_at(scene, number) : NULL;
   hap_scene_joint value;
   if (joint == NULL) {
@@ -169,9 +151,7 @@ hap_status hap_scene_get_joint(const hap_scene *scene, uint32_t number, hap_scen
   value.body_b = hap_scene_find_body(scene, b);
   value.axes = hapi_scene_joint_axes(joint->kind);
   hapi_v3_copy(dBodyGetPosition(a != NULL ? a : b), value.anchor);
-  if (readers[joint->kind] != NULL) {
-    readers[joint->kind](joint->joint, &value);
-  }
+  joint_read(&joint_readers[joint->kind], joint->joint, &value);
   return value_give(&value, sizeof value, out, size_of_out);
 }
 
