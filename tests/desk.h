@@ -8,6 +8,7 @@
 
 #include <time.h>
 
+#include "tests/files.h"
 #include "tests/ode_world.h"
 
 #define T 1e-3 /* s, of a tick */
@@ -20,6 +21,7 @@ typedef struct desk {
   hap_session_def def;
   hap_ode_def ode;
   hap_session *session;
+  hap_player *player; /* of a replay */
   hap_pointer_def hand_def;
   hap_pointer_id hand;
   double at[3];
@@ -30,6 +32,7 @@ static inline void desk_end(void *owned)
 {
   desk *d = owned;
   ode_world_end(d->session, d->world, d->space);
+  hap_player_close(d->player);
 }
 
 static inline desk *desk_new(double gravity, hap_model model)
@@ -89,6 +92,49 @@ static inline void desk_move(desk *d, double x, double y, double z, int ticks)
     hand_lead(d);
     REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
   }
+}
+
+/* In real time, to a file of that name. The caller starts it, and stops it at the end. */
+static inline void desk_record(desk *d, const char *name, double height)
+{
+  hap_detail detail = {""};
+  hap_record_def file;
+  REQUIRE(folder_make());
+  hap_record_def_init(&file, sizeof file);
+  file.path = folder_path(name);
+  d->def.drive = HAP_DRIVE_THREADS;
+  d->def.rt_priority = 0;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_session_record(d->session, &file, &detail) == HAP_OK);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  d->at[2] = height;
+  hand_lead(d);
+}
+
+/* A session that plays that file, over the same things. */
+static inline void desk_replay(desk *d, const char *name)
+{
+  hap_detail detail = {""};
+  hap_expert_def expert;
+  hap_research_def research;
+  hap_expert_def_init(&expert, sizeof expert);
+  hap_research_def_init(&research, sizeof research);
+  REQUIRE(hap_player_open(folder_path(name), HAP_PLAY_WHOLE, &d->player, &detail) >= HAP_OK);
+  REQUIRE(hap_player_get_def(d->player, &d->def, &expert, &research) >= HAP_OK);
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_session_play(d->session, d->player, &detail) >= HAP_OK);
+}
+
+static inline void desk_play(desk *d)
+{
+  hap_detail detail = {""};
+  hap_status status = HAP_OK;
+  session_run(d->session);
+  while (status == HAP_OK) {
+    status = hap_session_advance(d->session, 100);
+  }
+  (void)hap_session_detail(d->session, &detail);
+  REQUIRE_SAY(status == HAP_END, "%s", detail.text);
 }
 
 /* In real time. */

@@ -10,7 +10,6 @@
 #include <hapode/forces.h>
 
 #include "tests/desk.h"
-#include "tests/files.h"
 
 #define EXACT 1e-9 /* N */
 
@@ -676,22 +675,10 @@ static void forced_session(desk *d)
 
 TEST(a_replay_has_the_same_forces)
 {
-  hap_detail detail = {""};
-  hap_record_def file;
-  hap_player *player = NULL;
-  REQUIRE(folder_make());
-  hap_record_def_init(&file, sizeof file);
-  file.path = folder_path("forces.rec");
   desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
   floor_add(d);
   d->hand_def.friction = 0.2;
-  d->def.drive = HAP_DRIVE_THREADS;
-  d->def.rt_priority = 0;
-  d->session = session_make(&d->def, &d->ode);
-  REQUIRE(hap_session_record(d->session, &file, &detail) == HAP_OK);
-  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
-  d->at[2] = 0.02;
-  hand_lead(d);
+  desk_record(d, "forces.rec", 0.02);
   session_run(d->session);
   forced_session(d);
   CHECK(hap_session_stop(d->session) == HAP_OK);
@@ -700,21 +687,9 @@ TEST(a_replay_has_the_same_forces)
   tap_release(d);
 
   desk *r = desk_new(0.0, HAP_MODEL_CONTACT);
-  hap_expert_def expert;
-  hap_research_def research;
   floor_add(r);
-  hap_expert_def_init(&expert, sizeof expert);
-  hap_research_def_init(&research, sizeof research);
-  REQUIRE(hap_player_open(file.path, HAP_PLAY_WHOLE, &player, &detail) >= HAP_OK);
-  REQUIRE(hap_player_get_def(player, &r->def, &expert, &research) >= HAP_OK);
-  r->session = session_make(&r->def, &r->ode);
-  REQUIRE(hap_session_play(r->session, player, &detail) >= HAP_OK);
-  session_run(r->session);
-  hap_status status = HAP_OK;
-  while (status == HAP_OK) {
-    status = hap_session_advance(r->session, 100);
-  }
-  CHECK(status == HAP_END);
+  desk_replay(r, "forces.rec");
+  desk_play(r);
   hap_force_def def = force_of(HAP_FORCE_CONSTANT);
   hap_force_id id;
   CHECK(hap_pointer_force_add(r->session, hand, &def, &id) == HAP_ERROR_STATE);
@@ -723,7 +698,4 @@ TEST(a_replay_has_the_same_forces)
   CHECK(memcmp(&again.wrench, &last.wrench, sizeof last.wrench) == 0);
   CHECK(memcmp(&again.own, &last.own, sizeof last.own) == 0);
   CHECK(last.own.force[1] != 0.0);
-  hap_session_destroy(r->session);
-  r->session = NULL;
-  hap_player_close(player);
 }

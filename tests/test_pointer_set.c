@@ -8,7 +8,6 @@
 #include <time.h>
 
 #include "tests/desk.h"
-#include "tests/files.h"
 
 #define DEPTH 0.002 /* m, that the hand is in the floor */
 #define LIMIT 20.0  /* N */
@@ -810,24 +809,10 @@ static void hand_ride(desk *d)
 
 TEST(a_replay_has_what_was_set_bit_for_bit)
 {
-  hap_detail detail = {""};
-  hap_record_def file;
-  hap_player *player = NULL;
-  hap_expert_def expert;
-  hap_research_def research;
-  REQUIRE(folder_make());
-  hap_record_def_init(&file, sizeof file);
-  file.path = folder_path("set.rec");
   desk *d = desk_new(10.0, HAP_MODEL_CONTACT);
   floor_add(d);
   ode_box(d->world, d->space, 0.1, AT(0.04, 0.04, 0.04), AT(0.05, 0.0, 0.02));
-  d->def.drive = HAP_DRIVE_THREADS;
-  d->def.rt_priority = 0;
-  d->session = session_make(&d->def, &d->ode);
-  REQUIRE(hap_session_record(d->session, &file, &detail) == HAP_OK);
-  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
-  d->at[2] = RADIUS;
-  hand_lead(d);
+  desk_record(d, "set.rec", RADIUS);
   hap_pointer_settings s = settings_of(HAP_SET_DAMPING);
   s.damping = 3.0; /* before the first tick */
   hand_set(d, &s);
@@ -839,21 +824,7 @@ TEST(a_replay_has_what_was_set_bit_for_bit)
   desk *r = desk_new(10.0, HAP_MODEL_CONTACT);
   floor_add(r);
   ode_box(r->world, r->space, 0.1, AT(0.04, 0.04, 0.04), AT(0.05, 0.0, 0.02));
-  hap_expert_def_init(&expert, sizeof expert);
-  hap_research_def_init(&research, sizeof research);
-  REQUIRE(hap_player_open(file.path, HAP_PLAY_WHOLE, &player, &detail) >= HAP_OK);
-  REQUIRE(hap_player_get_def(player, &r->def, &expert, &research) >= HAP_OK);
-  r->session = session_make(&r->def, &r->ode);
-  REQUIRE(hap_session_play(r->session, player, &detail) >= HAP_OK);
-  session_run(r->session);
-  hap_status status = HAP_OK;
-  while (status == HAP_OK) {
-    status = hap_session_advance(r->session, 100);
-  }
-  (void)hap_session_detail(r->session, &detail);
-  REQUIRE_SAY(status == HAP_END, "%s", detail.text);
+  desk_replay(r, "set.rec");
+  desk_play(r);
   CHECK(hap_pointer_set(r->session, (hap_pointer_id){1}, &s) == HAP_ERROR_STATE);
-  hap_session_destroy(r->session);
-  r->session = NULL;
-  hap_player_close(player);
 }

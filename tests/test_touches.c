@@ -12,7 +12,6 @@
 
 #include "tests/desk.h"
 #include "tests/fake_device.h"
-#include "tests/files.h"
 
 #define EVENTS 256
 
@@ -497,23 +496,11 @@ TEST(a_replay_tells_the_same_events)
 {
   hap_event told[EVENTS];
   hap_event again[EVENTS];
-  hap_detail detail;
-  hap_record_def file;
-  hap_player *player = NULL;
   size_t count = 0;
-  REQUIRE(folder_make());
-  hap_record_def_init(&file, sizeof file);
-  file.path = folder_path("touches.rec");
   desk *d = desk_new(10.0, HAP_MODEL_CONTACT);
   stroke_world(d);
   d->hand_def.friction = 0.3;
-  d->def.drive = HAP_DRIVE_THREADS;
-  d->def.rt_priority = 0;
-  d->session = session_make(&d->def, &d->ode);
-  REQUIRE(hap_session_record(d->session, &file, &detail) == HAP_OK);
-  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
-  d->at[2] = 0.02;
-  hand_lead(d);
+  desk_record(d, "touches.rec", 0.02);
   (void)events_of(d, told);
   session_run(d->session);
   desk_glide(d, 0.0, 0.0, -0.012);
@@ -525,19 +512,10 @@ TEST(a_replay_tells_the_same_events)
   tap_release(d);
 
   desk *r = desk_new(10.0, HAP_MODEL_CONTACT);
-  hap_expert_def expert;
-  hap_research_def research;
   stroke_world(r);
-  hap_expert_def_init(&expert, sizeof expert);
-  hap_research_def_init(&research, sizeof research);
-  REQUIRE(hap_player_open(file.path, HAP_PLAY_WHOLE, &player, &detail) >= HAP_OK);
-  REQUIRE(hap_player_get_def(player, &r->def, &expert, &research) >= HAP_OK);
-  r->session = session_make(&r->def, &r->ode);
-  REQUIRE(hap_session_play(r->session, player, &detail) >= HAP_OK);
+  desk_replay(r, "touches.rec");
   (void)events_of(r, again);
-  session_run(r->session);
-  while (hap_session_advance(r->session, 100) == HAP_OK) {
-  }
+  desk_play(r);
   REQUIRE(hap_session_events(r->session, again, EVENTS, sizeof *again, &count) == HAP_OK);
   REQUIRE(count == number);
   for (size_t i = 0; i < count; ++i) { /* but for the addresses of geoms and bodies */
@@ -546,9 +524,6 @@ TEST(a_replay_tells_the_same_events)
     CHECK(again[i].speed == told[i].speed && again[i].impulse == told[i].impulse);
     CHECK((again[i].body == NULL) == (told[i].body == NULL));
   }
-  hap_session_destroy(r->session);
-  r->session = NULL;
-  hap_player_close(player);
 }
 
 TEST(the_first_call_begins_it_and_says_so)
