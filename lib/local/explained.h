@@ -9,8 +9,13 @@
  *   |f' - f| <= k (|dx| + T |u|) + d (|dv| + |du|)
  *
  * with dx and dv of the pointer, and u the velocity of the surface where it is touched. A damper
- * that begins or ends adds d (|v| + |u|), a contact that comes in slowly its force in its time, and
- * a texture what its height and slope have changed.
+ * that begins or ends adds d (|v| + |u|), and a contact that comes in slowly its force in its time.
+ * A texture pushes along a vector q that is no unit vector, f q with f = k (depth + height) and the
+ * damper d (q v) q, so that each of them gets its factor of |q|, and what height and q change in
+ * the tick adds
+ *
+ *   k |q| |dh| + f |dq| + 2 d |q| |dq| |v|
+ *
  * Sums of absolute values stand for norms: they are larger, and need no root. */
 
 #include <math.h>
@@ -33,26 +38,31 @@ static inline void hapi_explained_begin(hapi_pointer *p)
   memset(&p->guard.change.explained, 0, sizeof p->guard.change.explained);
 }
 
-/* Of a contact that pushes; its damper begins with a depth above 0. body: after its step; NULL: it
+/* Of a contact that pushes; its damper begins with a depth above 0. depth: m, without a texture.
+ * body: after its step; NULL: it
  * does not move. */
 static inline void hapi_contact_explain(hapi_pointer *p, const hapi_local_contact *c, double depth,
                                         const hapi_local_body *body, double period)
 {
   hapi_explained *e = &p->guard.change.explained;
+  depth += c->feel.special ? c->feel.lift : 0.0;
   double k = c->weight * (p->rigid ? p->coupling.stiffness : hapi_touch_stiffness(c, p));
   double d = !(depth > 0.0)
                  ? 0.0
                  : c->weight * (p->proxied ? p->coupling.damping : hapi_touch_damping(c, p));
   double comes = 0.0;
-  e->stiffness += k;
   if (c->ramp.felt_stiffness > 0.0) { /* one that is set changes in its time */
     double added = fabs(hapi_touch_stiffness(c, p) - c->ramp.felt_stiffness);
     e->world += c->weight * added * fmax(depth, 0.0);
   }
-  if (c->feel.special) { /* what a texture does on the hand's way */
-    e->world += k * (c->feel.lifted + fmax(depth, 0.0) * c->feel.turned);
-    e->world += d * c->feel.turned * hapi_sum_of_sizes(p->twist.linear);
+  if (c->feel.special) {
+    double push = hapi_v3_norm(c->feel.push) + c->feel.turned; /* now or before, at most */
+    e->world += k * (push * c->feel.lifted + fmax(depth, 0.0) * c->feel.turned);
+    e->world += 2.0 * d * push * c->feel.turned * hapi_sum_of_sizes(p->twist.linear);
+    k *= push;
+    d *= push * push;
   }
+  e->stiffness += k;
   e->damping += d;
   if (c->ramp.share < 1.0) {
     comes = fmax(depth, 0.0) / HAPI_SAFETY_CONTACT_RAMP_S;
