@@ -33,8 +33,7 @@ static hap_status grains_make(hap_session *session, uint32_t *out)
   }
   hap_texture_def def;
   hap_texture_def_init(&def, sizeof def);
-  def.heights = heights, def.columns = def.rows = 32;
-  def.pitch = 5e-4; /* m */
+  def.heights = heights, def.columns = def.rows = 32, def.pitch = 5e-4;
   return hap_session_add_texture(session, &def, out);
 }
 
@@ -72,10 +71,8 @@ int main(void)
   for (int i = 0; i < 27 && hap_session_advance(session, 100) == HAP_OK; ++i) {
     hap_pointer_get(session, hand, &state, sizeof state);
     double x = state.proxy.position[0];
-    printf("%6.1f mm: %-9s presses with %.2f N, rubs with %.2f N\n", 1e3 * x,
-           names[x < 0.05   ? 0
-                 : x < 0.15 ? 1
-                            : 2],
+    int tile = (int)((x + 0.05) / 0.1);
+    printf("%6.1f mm: %-9s presses with %.2f N, rubs with %.2f N\n", 1e3 * x, names[tile],
            state.wrench.force[2], -state.wrench.force[0]);
   }
   hap_session_destroy(session);
