@@ -52,6 +52,26 @@ static void count_lines(hap_log_level level, const char *text, void *user)
   }
 }
 
+/* Before the first step nobody has seen the joints. */
+TEST(a_body_near_the_hand_does_not_fall_in_the_first_step)
+{
+  group = dJointGroupCreate(0);
+  contact_world *w = cw_new(CW_GRAVITY);
+  dWorldSetContactSurfaceLayer(w->world, 1e-4);
+  w->def.physics_hz = 20.0;
+  w->ode.surface = no_surface;
+  w->ode.before_step = collide_before_step;
+  w->hand_def.radius = 0.005;
+  (void)cw_add_floor(w);
+  dBodyID box = cw_add_cube(w, 0.5, 0.1, 0.0, 0.0, 0.05 - 1e-4);
+  cw_start(w, 0.0, 0.0, 0.1 + 0.005 + 0.001);
+  for (int i = 0; i < 200; ++i) {
+    cw_tick(w);
+    CHECK_NEAR(dBodyGetPosition(box)[2], 0.05 - 1e-4, 1e-5);
+  }
+  dJointGroupEmpty(group);
+}
+
 TEST(a_body_on_contact_joints_of_the_application_is_felt)
 {
   contact_world w;

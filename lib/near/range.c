@@ -590,6 +590,9 @@ static void link_geom(void *data, dGeomID a, dGeomID b)
   }
   if (hapi_world_surface(nearby->world, nearby->cycle, link)) {
     ++links->count;
+  } else if (gap <= 0.0 && nearby->cycle->model_number == 0 &&
+             !dAreConnectedExcluding(links->own_body, body, dJointTypeContact)) {
+    links->missing = true; /* before the first step nobody knows who holds that pair apart */
   }
 }
 

@@ -26,7 +26,7 @@ typedef struct hapi_links {
   hapi_link *list;
   uint32_t count;
   uint32_t capacity;
-  bool missing;     /* no memory for one */
+  bool missing;     /* no memory for one, or one that nobody knows yet */
   dGeomID box_geom; /* private, in no space */
   hapi_cover cover;
   dBodyID own_body; /* the body, and the geom that is asked for, while ODE calls back */
