@@ -186,19 +186,24 @@ def check_try_device(program):
           "it prints where the device is", out)
 
 
-def shown(page):
-    """The example that a page shows in parts or None, and its blocks."""
-    parts = PARTS.search(page)
-    blocks = BLOCK.findall(page[:parts.start()] if parts else page)
-    return parts.group(1) if parts else None, blocks if parts else blocks[:1]
+def shown(page, name):
+    """The blocks of a page that show an example: those before its mark, back to the mark of another
+    one; None where the page has no marks, and its first block is all of the program."""
+    begin = 0
+    for mark in PARTS.finditer(page):
+        if mark.group(1) == name:
+            return BLOCK.findall(page[begin:mark.start()])
+        begin = mark.end()
+    return None if begin == 0 else []
 
 
 def shows(page, name):
-    parts_of, blocks = shown(page)
+    blocks = shown(page, name)
     source = example_of(name)
-    if parts_of is None:
-        return bool(blocks) and blocks[0].strip() == source
-    return parts_of == name and bool(blocks) and all(block in source + "\n" for block in blocks)
+    if blocks is None:
+        first = BLOCK.search(page)
+        return first is not None and first.group(1).strip() == source
+    return bool(blocks) and all(block in source + "\n" for block in blocks)
 
 
 def part(lines, old):
@@ -216,10 +221,10 @@ def update():
     """Writes the examples into the pages."""
     for name, page in PAGES.items():
         text = read(page)
-        parts_of, blocks = shown(text)
-        for block in blocks:
+        blocks = shown(text, name)
+        for block in BLOCK.findall(text)[:1] if blocks is None else blocks:
             new = example_of(name) + "\n"
-            if parts_of is not None:
+            if blocks is not None:
                 new = part(new.split("\n"), block.rstrip("\n").split("\n"))
             text = text.replace(f"```c\n{block}```", f"```c\n{new}```", 1)
         (root / page).write_text(text, encoding="utf-8")
