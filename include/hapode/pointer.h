@@ -197,6 +197,13 @@ typedef struct hap_pointer_state {
    * (GOD_OBJECT, VIRTUAL) */
   double contact_stiffness;
   hap_wrench own; /* part of wrench that own forces and surfaces' vibrations have (forces.h) */
+  /* What the end effector measures beyond its pose, such as a gripper's opening, in the units of
+   * hap_axis_info: checked, and from low to high. A value that no hand can have made is not taken
+   * over: the one before stands, with a rate of 0. */
+  uint32_t axis_count; /* 0: none */
+  uint32_t reserved;
+  double axes[HAP_AXES_MAX];
+  double axis_rates[HAP_AXES_MAX]; /* of those, a second */
 } hap_pointer_state;
 
 /* [any] State after the newest tick. size_of_out: sizeof *out of the caller's build.

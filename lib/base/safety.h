@@ -39,6 +39,8 @@
 #define HAPI_SAFETY_STRING_SHARE 2.0         /* 1 */
 #define HAPI_SAFETY_STALE_QUANTA 6.0         /* 1 */
 #define HAPI_SAFETY_SILENCE_S 0.01           /* s */
+#define HAPI_SAFETY_AXIS_SPEED 100.0         /* 1/s */
+#define HAPI_SAFETY_AXIS_BEYOND 0.05         /* 1 */
 
 /* ---- how fast force comes and goes ---- */
 #define HAPI_SAFETY_SLEW_S 0.002     /* s */

@@ -164,19 +164,35 @@ static hap_status check_info(const hap_device_ops *ops, const hap_device_info *i
   return check_counts(ops, info, detail);
 }
 
+static bool axis_is_known(const hap_axis_info *axis)
+{
+  return axis->kind <= HAP_AXIS_GRIPPER && axis->unit <= HAP_AXIS_SHARE;
+}
+
+static bool axis_has_range(const hap_axis_info *axis)
+{
+  return fabs(axis->low) <= AXIS_MOST && fabs(axis->high) <= AXIS_MOST &&
+         axis->high - axis->low >= HAPI_NUMBER_LEAST;
+}
+
+bool hapi_device_axis_good(const hap_axis_info *axis)
+{
+  return axis_is_known(axis) && axis_has_range(axis) &&
+         hapi_device_figures_good(&axis->max_force, 1);
+}
+
 static hap_status check_axis(const hap_device_ops *ops, uint32_t index, const hap_axis_info *axis,
                              hap_detail *detail)
 {
-  bool range = fabs(axis->low) <= AXIS_MOST && fabs(axis->high) <= AXIS_MOST &&
-               axis->high - axis->low >= HAPI_NUMBER_LEAST;
-  bool known = axis->kind <= HAP_AXIS_GRIPPER && axis->unit <= HAP_AXIS_SHARE;
-  if (!range || !known || !hapi_device_figures_good(&axis->max_force, 1)) {
-    return hapi_fail(detail, HAP_ERROR_DEVICE, "device '%s', axis %u: %s", ops->name, index,
-                     !known  ? "an unknown kind or unit; is the library older than the device?"
-                     : range ? "max_force is neither 0 nor from 1e-15 to 1e9"
-                             : "low and high are not finite, beyond 1e6, or not in this order");
+  if (hapi_device_axis_good(axis)) {
+    return HAP_OK;
   }
-  return HAP_OK;
+  return hapi_fail(detail, HAP_ERROR_DEVICE, "device '%s', axis %u: %s", ops->name, index,
+                   !axis_is_known(axis)
+                       ? "an unknown kind or unit; is the library older than the device?"
+                   : axis_has_range(axis)
+                       ? "max_force is neither 0 nor from 1e-15 to 1e9"
+                       : "low and high are not finite, beyond 1e6, or not in this order");
 }
 
 static void info_read(const hap_device *device, uint32_t effector, hap_device_info *out)

@@ -93,6 +93,8 @@ const hap_device_info *hapi_device_info(const hap_device *device);
 /* [any] Whether a device may describe itself with these: each is 0 (unknown) or from
  * HAPI_NUMBER_LEAST to 1e9 in SI units. */
 HAP_NODISCARD bool hapi_device_figures_good(const double *figures, size_t count);
+/* [any] Likewise an axis: known, a range, and a figure. */
+HAP_NODISCARD bool hapi_device_axis_good(const hap_axis_info *axis);
 
 /* [any] What the device says of its last failure; "" when it says nothing. */
 void hapi_device_explain(const hap_device_ops *ops, void *self, hap_detail *out);

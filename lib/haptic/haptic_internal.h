@@ -51,7 +51,8 @@ typedef struct hapi_pointer_slot {
   bool has_device;         /* also in a replay, where there are no ops */
   bool started;
   hap_device_info info;
-  pthread_mutex_t lock; /* between applications that set, get, ask and remove */
+  hap_axis_info axes[HAP_AXES_MAX]; /* info.axis_count */
+  pthread_mutex_t lock;             /* between applications that set, get, ask and remove */
   hapi_triple_buffer target_buffer;
   hapi_pointer_target targets[3];
   hapi_own_list own;
@@ -244,7 +245,8 @@ void hapi_tape_ticked(hapi_haptic *haptic);
 /* Replay only; false: no more of them come now. */
 bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pauses);
 bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out,
-                         hap_device_info *out_info, hapi_tool_hull *out_hull);
+                         hap_device_info *out_info, hap_axis_info *out_axes,
+                         hapi_tool_hull *out_hull);
 
 bool hapi_tape_next_set(hapi_haptic *haptic, uint32_t index, hapi_pointer_setting *out,
                         hapi_tool_hull *out_hull);

@@ -11,6 +11,7 @@
 #include "device/device.h"
 #include "device/emergency.h"
 #include "guard/force_guard.h"
+#include "haptic/axes.h"
 #include "haptic/coupling_gains.h"
 #include "haptic/own_forces.h"
 #include "pointer/coupling.h"
@@ -59,6 +60,7 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   p->handle.quat[0] = p->proxy.quat[0] = 1.0;
   p->pose.quat_wxyz[0] = 1.0;
   hapi_own_begin(haptic, index);
+  hapi_axes_join(haptic, index);
 }
 
 /* For a new user of the slot, whose def is in it. */
@@ -89,6 +91,7 @@ static void follow_tape(hapi_haptic *haptic)
   bool pauses = false;
   hapi_joined joined;
   hap_device_info info;
+  hap_axis_info axes[HAP_AXES_MAX];
   hapi_tool_hull hull;
   for (;;) {
     if (hapi_tape_next_leave(haptic, &index, &pauses)) {
@@ -96,13 +99,14 @@ static void follow_tape(hapi_haptic *haptic)
       atomic_store(&haptic->slots[index].phase, pauses ? HAPI_POINTER_PAUSED : HAPI_POINTER_EMPTY);
       continue;
     }
-    if (!hapi_tape_next_join(haptic, &index, &joined, &info, &hull)) {
+    if (!hapi_tape_next_join(haptic, &index, &joined, &info, axes, &hull)) {
       return;
     }
     hapi_pointer_slot *slot = &haptic->slots[index];
     slot->hull = hull;
     slot->def = joined.def;
     slot->info = info;
+    memcpy(slot->axes, axes, sizeof slot->axes);
     slot->has_device = joined.has_device != 0;
     slot->set.swaps = 0; /* is in the def */
     if (atomic_load(&slot->phase) != HAPI_POINTER_PAUSED ||
@@ -230,6 +234,9 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     if (haptic->tape != NULL) {
       hapi_tape_input(haptic, i, &in);
     }
+    if (p->has_axes && !hapi_axes_read(haptic, i, now_ns, in.failed)) {
+      in.doubted = true;
+    }
     if (in.failed) {
       fail_device(haptic, i, HAP_FAULT_DEVICE_READ);
       continue;
@@ -302,6 +309,15 @@ static hap_wrench declared_felt(const hapi_pointer *p)
   return felt;
 }
 
+static void axes_tell(const hapi_axes *axes, hap_pointer_state *out)
+{
+  out->axis_count = axes->count;
+  for (uint32_t i = 0; i < axes->count; ++i) {
+    out->axes[i] = axes->of[i].at;
+    out->axis_rates[i] = axes->of[i].rate;
+  }
+}
+
 void hapi_pointers_publish(hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->tick.pointers.high; ++i) {
@@ -312,7 +328,8 @@ void hapi_pointers_publish(hapi_haptic *haptic)
     }
     double scale = p->device.motion_scale * p->device.force_scale;
     hap_coupling spring = p->rigid ? p->coupling.kind : HAP_COUPLING_PROXY;
-    slot->states[hapi_triple_back(&slot->state_buffer)] = (hap_pointer_state){
+    hap_pointer_state *state = &slot->states[hapi_triple_back(&slot->state_buffer)];
+    *state = (hap_pointer_state){
         .size = sizeof(hap_pointer_state),
         .contacts = p->contacts,
         .stamp_ns = haptic->tick.facts.now_ns,
@@ -329,6 +346,9 @@ void hapi_pointers_publish(hapi_haptic *haptic)
         .contact_stiffness = scale * p->coupling.contact_stiffness,
         .own = p->declared.any ? declared_felt(p) : (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}},
     };
+    if (p->has_axes) {
+      axes_tell(&haptic->tick.axes[i], state);
+    }
     hapi_triple_publish(&slot->state_buffer);
   }
 }
@@ -492,6 +512,7 @@ static void fill_slot(hapi_pointer_slot *slot, const hapi_pointer_setup *def)
   memset(&slot->info, 0, sizeof slot->info);
   if (def->device != NULL) {
     slot->info = slot->effector->info;
+    memcpy(slot->axes, slot->effector->axes, sizeof slot->axes);
   }
   slot_prepare(slot);
 }

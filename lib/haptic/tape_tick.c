@@ -5,7 +5,8 @@
 #include <string.h>
 
 #include "base/pointer_id.h"
-#include "haptic/haptic_internal.h"
+#include "haptic/axes.h"
+#include "tick/report.h"
 
 /* The loop's part of a recording: all that a tick has from outside is put on the tape, or in a
  * replay taken from it, and what came of it is hashed. */
@@ -183,6 +184,7 @@ void hapi_tape_join(hapi_haptic *haptic, uint32_t index)
   joined.has_device = slot->has_device;
   joined_move(haptic->tape, index, &joined);
   hull_move(haptic->tape, index, &slot->hull);
+  hapi_tape_axis_infos(haptic->tape, index, slot->axes, &slot->info);
 }
 
 void hapi_tape_leave(hapi_haptic *haptic, uint32_t index, bool pauses)
@@ -205,7 +207,8 @@ bool hapi_tape_next_leave(hapi_haptic *haptic, uint32_t *out_index, bool *out_pa
 }
 
 bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *out,
-                         hap_device_info *out_info, hapi_tool_hull *out_hull)
+                         hap_device_info *out_info, hap_axis_info *out_axes,
+                         hapi_tool_hull *out_hull)
 {
   hapi_tape *tape = haptic->tape;
   if (!hapi_tape_next_is(tape, HAPI_CELL_JOIN)) {
@@ -219,6 +222,8 @@ bool hapi_tape_next_join(hapi_haptic *haptic, uint32_t *out_index, hapi_joined *
   device_move(tape, &out->device, out_info);
   hull_count(out->def.hull_points, out_hull);
   hull_move(tape, *out_index, out_hull);
+  memset(out_axes, 0, HAP_AXES_MAX * sizeof *out_axes);
+  hapi_tape_axis_infos(tape, *out_index, out_axes, out_info);
   return !tape->broken && *out_index < haptic->config.capacity.pointers;
 }
 
@@ -270,14 +275,16 @@ void hapi_tape_input(hapi_haptic *haptic, uint32_t index, hapi_pointer_input *io
                  sizeof io->twist);
 }
 
-static uint64_t hash_pointer(const hapi_pointer *p)
+static uint64_t hash_pointer(const hapi_tick *tick, uint32_t index)
 {
+  const hapi_pointer *p = &tick->pointers.of[index];
   uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, p->device.buttons);
   hash = hapi_hash_motion(hash, &p->device.pose, &p->device.twist);
   hash = hapi_hash_motion(hash, &p->pose, &p->twist);
   hash = hapi_hash_doubles(hash, p->wrench.force, 3);
   hash = hapi_hash_doubles(hash, p->device.wrench.force, 3);
-  return hapi_hash_doubles(hash, p->device.wrench.torque, 3);
+  hash = hapi_hash_doubles(hash, p->device.wrench.torque, 3);
+  return hapi_tick_hash_axes(tick, index, hash);
 }
 
 static void cell_compare(hapi_haptic *haptic, hapi_difference *difference, const hapi_cell *cell,
@@ -295,7 +302,7 @@ void hapi_tape_output(hapi_haptic *haptic, uint32_t index, hapi_pointer_output *
 {
   hapi_tape *tape = haptic->tape;
   const hapi_pointer *p = &haptic->tick.pointers.of[index];
-  uint64_t hash = hash_pointer(p);
+  uint64_t hash = hash_pointer(&haptic->tick, index);
   double wrench[6];
   double reached[6]; /* bit by bit: no padding in it */
   memcpy(wrench, &p->device.wrench, sizeof wrench);
@@ -328,7 +335,7 @@ static uint64_t hash_tick(const hapi_tick *tick)
   hash = hapi_hash_word(hash, (uint64_t)tick->guard.latch.fault);
   for (uint32_t i = 0; i < tick->capacity.pointers; ++i) {
     if (tick->pointers.of[i].generation != 0) {
-      hash = hapi_hash_word(hash, hash_pointer(&tick->pointers.of[i]));
+      hash = hapi_hash_word(hash, hash_pointer(tick, i));
     }
   }
   for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {

@@ -255,6 +255,8 @@ typedef struct hapi_pointer {
   bool proxied;        /* it is a proxy, of whatever coupling */
   bool rigid;          /* one whose contacts do not give: god-object and virtual tool */
   bool own;            /* it has own forces: tick/own_forces.h */
+  bool has_axes;       /* pointer/axes.h */
+  bool drives;         /* outputs beside the wrench were set: tick/outputs.h */
   hap_pose pose;
   hap_twist twist;
   hap_wrench wrench; /* on the hand: of contacts; after the guard with what is declared */

@@ -350,6 +350,16 @@ void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out)
   }
 }
 
+uint64_t hapi_tick_hash_axes(const hapi_tick *tick, uint32_t pointer, uint64_t hash)
+{
+  const hapi_pointer *p = &tick->pointers.of[pointer];
+  for (uint32_t i = 0; p->has_axes && i < tick->axes[pointer].count; ++i) {
+    hash = hapi_hash_doubles(hash, &tick->axes[pointer].of[i].at, 1);
+    hash = hapi_hash_doubles(hash, &tick->axes[pointer].of[i].rate, 1);
+  }
+  return hash;
+}
+
 uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash)
 {
   for (uint32_t i = 0; i < tick->pointers.high; ++i) {
@@ -358,6 +368,7 @@ uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash)
       hash = hapi_hash_doubles(hash, p->pose.position, 3);
       hash = hapi_hash_doubles(hash, p->device.wrench.force, 3);
       hash = hapi_hash_doubles(hash, p->device.wrench.torque, 3);
+      hash = hapi_tick_hash_axes(tick, i, hash);
     }
   }
   for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {

@@ -30,6 +30,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       {&tick->pointers.of, c->pointers, sizeof *tick->pointers.of, true},
       {&tick->pointers.hulls, c->pointers, sizeof *tick->pointers.hulls, true},
       ARRAY(own, (size_t)HAP_FORCES_MAX * c->pointers),
+      ARRAY(axes, c->pointers),
       ARRAY(bodies.of, c->bodies),
       ARRAY(bodies.courses, c->bodies),
       ARRAY(bodies.live, c->bodies),

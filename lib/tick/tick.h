@@ -29,6 +29,7 @@
 #include "local/joint_rows.h"
 #include "local/rows.h"
 #include "local/touch.h"
+#include "pointer/axes.h"
 #include "pointer/pointer.h"
 #include "sync/messages.h"
 #include "tick/own_forces.h"
@@ -45,6 +46,7 @@ typedef struct hapi_tick {
   hapi_tick_facts facts;
   hapi_pointers pointers;
   hapi_own_force *own; /* HAP_FORCES_MAX of each pointer */
+  hapi_axes *axes;     /* by pointer, of those that have some */
   hapi_bodies bodies;
   hapi_touches touches;
   hapi_body_contacts contacts;
@@ -65,7 +67,7 @@ typedef struct hapi_tick_array {
   bool stays;  /* hapi_tick_reset does not touch it */
 } hapi_tick_array;
 
-#define HAPI_TICK_ARRAYS 27
+#define HAPI_TICK_ARRAYS 28
 
 /* All of them; the capacity, and that of rows, buckets and work, are set. */
 void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS]);

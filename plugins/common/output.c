@@ -2,8 +2,6 @@
  * SPDX-License-Identifier: MIT */
 #include "plugins/common/output.h"
 
-#include <stdbool.h>
-
 #include "base/assert.h"
 #include "base/vec.h"
 
@@ -35,9 +33,14 @@ void hapi_output_zero(hapi_output *output)
   atomic_store_explicit(&output->zeroed.raised, true, memory_order_release);
 }
 
+bool hapi_output_is_zeroed(const hapi_output *output)
+{
+  return atomic_load_explicit(&output->zeroed.raised, memory_order_acquire);
+}
+
 void hapi_output_get(const hapi_output *output, hap_wrench *out)
 {
-  if (atomic_load_explicit(&output->zeroed.raised, memory_order_acquire)) {
+  if (hapi_output_is_zeroed(output)) {
     *out = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
     return;
   }

@@ -6,6 +6,7 @@
 /* The wrench that a device without hardware holds. All calls by the haptic thread but zero. */
 
 #include <stdatomic.h>
+#include <stdbool.h>
 
 #include <hapode/spatial.h>
 #include <hapode/status.h>
@@ -32,6 +33,9 @@ HAP_NODISCARD hap_status hapi_output_write(hapi_output *output, const hap_wrench
 
 /* [any] Lock-free, also from a signal handler; holds until the next write. */
 void hapi_output_zero(hapi_output *output);
+
+/* Whether nothing acts since a zero. */
+bool hapi_output_is_zeroed(const hapi_output *output);
 
 /* What acts on the hand now. */
 void hapi_output_get(const hapi_output *output, hap_wrench *out);

@@ -17,11 +17,11 @@
 #define DISTANCE_MAX 1e3 /* m */
 #define TWO_PI 6.283185307179586476925286766559
 
-static bool waypoint_read(const char *text, const char *stop, hapi_waypoint *out)
+static bool waypoint_read(const char *text, const char *stop, int numbers, hapi_waypoint *out)
 {
   const char *colon = hapi_number_read(text, &out->time);
   if (colon == NULL || *colon != ':' ||
-      !hapi_arguments_numbers(colon + 1, stop, 3, out->position)) {
+      !hapi_arguments_numbers(colon + 1, stop, numbers, out->position)) {
     return false;
   }
   bool near = true;
@@ -48,7 +48,7 @@ static hap_status waypoints_read(hapi_motion *motion, const hapi_motion_text *te
   for (size_t i = 0; i < motion->count; ++i) {
     const char *end = memchr(at, ';', (size_t)(stop - at));
     end = end != NULL ? end : stop;
-    if (!waypoint_read(at, end, &motion->waypoints[i])) {
+    if (!waypoint_read(at, end, text->numbers, &motion->waypoints[i])) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                        "virtual: %s: waypoint %zu: expected %s, not '%.*s'", text->key, i + 1,
                        text->expected, (int)(end - at < 60 ? end - at : 60), at);

@@ -16,6 +16,7 @@
 #include "plugins/common/timeline.h"
 #include "plugins/virtual/delay.h"
 #include "plugins/virtual/friction.h"
+#include "plugins/virtual/gripper.h"
 #include "plugins/virtual/motion.h"
 #include "plugins/virtual/virtual.h"
 
@@ -51,6 +52,7 @@ typedef struct virtual_device {
   hapi_motion turning; /* dof=6: rotation vector, rad, from the orientation on */
   hapi_hand wrist; /* the same model: its positions are a rotation vector, its mass an inertia */
   hapi_delay torque_delay;
+  hapi_gripper gripper;
   double work; /* J, see virtual.h */
   measured measured;
   hapi_output output;
@@ -87,6 +89,13 @@ enum argument {
   TURN_STIFFNESS,
   DEVICE_INERTIA,
   DEVICE_TURN_DAMPING,
+  GRIPPER,
+  GRIPPER_SINE,
+  GRIPPER_HZ,
+  GRIPPER_MOST,
+  GRIPPER_FORCE,
+  LEDS,
+  VIBRATORS,
   ARGUMENT_COUNT
 };
 
@@ -107,6 +116,14 @@ static const hapi_hand_def presets[] = {
     [RELAXED] = {0.2, 3.0, 150.0, 0.0},
     [TENSE] = {0.3, 10.0, 800.0, 0.0},
     [NOBODY] = {0.0, 0.0, 0.0, 0.0},
+};
+
+/* Fingers on a gripper, with the mechanism of 50 g: round numbers again. */
+static const hapi_hand_def fingers[] = {
+    [RIGID] = {1.0, 0.0, 0.0, 0.0}, /* not used */
+    [RELAXED] = {0.06, 1.0, 100.0, 0.5},
+    [TENSE] = {0.06, 4.0, 500.0, 0.5},
+    [NOBODY] = {0.05, 0.0, 0.0, 0.5},
 };
 
 /* The same of turning the handle, with a wrist: round numbers again. */
@@ -169,6 +186,17 @@ static const hapi_argument known_arguments[ARGUMENT_COUNT] = {
                         "kg m^2 from 0 to 1000"},
     [DEVICE_TURN_DAMPING] = {"device_turn_damping", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e4,
                              "N m s/rad from 0 to 1e4"},
+    [GRIPPER] = {"gripper", HAPI_ARGUMENT_TEXT, .expected = "T:x;T:x in s and m"},
+    [GRIPPER_SINE] = {"gripper_sine", HAPI_ARGUMENT_NUMBER, false, 0.0, 1.0, "m from 0 to 1"},
+    [GRIPPER_HZ] = {"gripper_hz", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e4, "a number from 0 to 10000",
+                    .number = {1.0}},
+    [GRIPPER_MOST] = {"gripper_max", HAPI_ARGUMENT_NUMBER, false, 1e-3, 1.0, "m from 0.001 to 1",
+                      .number = {0.08}},
+    [GRIPPER_FORCE] = {"gripper_force", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e3, "N from 0 to 1000",
+                       .number = {10.0}},
+    [LEDS] = {"leds", HAPI_ARGUMENT_NUMBER, false, 0.0, 32.0, "a whole number from 0 to 32"},
+    [VIBRATORS] = {"vibrators", HAPI_ARGUMENT_NUMBER, false, 0.0, HAP_VIBRATORS_MAX,
+                   "a whole number from 0 to 4"},
 };
 
 static hap_status set_motion(virtual_device *device, const hapi_argument *entries,
@@ -187,7 +215,7 @@ static hap_status set_motion(virtual_device *device, const hapi_argument *entrie
     return HAP_OK;
   }
   const hapi_motion_text text = {"path", "T:x/y/z in s and m (at most 1000 m)", entries[PATH].text,
-                                 entries[PATH].length};
+                                 entries[PATH].length, 3};
   return hapi_motion_set_path(motion, &text, detail);
 }
 
@@ -212,7 +240,7 @@ static hap_status set_turning(virtual_device *device, const hapi_argument *entri
     return HAP_OK;
   }
   const hapi_motion_text text = {"turn", "T:rx/ry/rz in s and rad", entries[TURN].text,
-                                 entries[TURN].length};
+                                 entries[TURN].length, 3};
   hap_status status = hapi_motion_set_path(turning, &text, detail);
   for (size_t i = 0; status >= HAP_OK && i < turning->count; ++i) {
     if (!(hapi_v3_norm(turning->waypoints[i].position) <= TURN_MOST)) {
@@ -306,6 +334,42 @@ static hap_status set_kick(virtual_device *device, const hapi_argument_table *ta
   return HAP_OK;
 }
 
+static hap_status set_gripper(virtual_device *device, const hapi_argument *entries,
+                              hap_detail *detail)
+{
+  hapi_gripper *gripper = &device->gripper;
+  size_t word = entries[HAND].given || !is_tuned(entries) ? entries[HAND].word : RELAXED;
+  gripper->there = entries[GRIPPER].given || entries[GRIPPER_SINE].given;
+  for (int i = GRIPPER_HZ; !gripper->there && i <= GRIPPER_FORCE; ++i) {
+    if (entries[i].given) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                       "virtual: %s needs gripper= or gripper_sine=", entries[i].key);
+    }
+  }
+  gripper->yields = word != RIGID;
+  gripper->high = entries[GRIPPER_MOST].number[0];
+  gripper->max_force = entries[GRIPPER_FORCE].number[0];
+  hapi_hand_init(&gripper->fingers, &fingers[word]);
+  hapi_motion *motion = &gripper->motion;
+  motion->blend = device->motion.blend;
+  motion->loop = device->motion.loop;
+  motion->hz = entries[GRIPPER_HZ].number[0];
+  motion->sine[0] = entries[GRIPPER_SINE].number[0];
+  device->info.axis_count = gripper->there ? 1 : 0;
+  device->info.led_count = (uint32_t)entries[LEDS].number[0];
+  device->info.vibrator_count = (uint32_t)entries[VIBRATORS].number[0];
+  if ((double)device->info.led_count != entries[LEDS].number[0] ||
+      (double)device->info.vibrator_count != entries[VIBRATORS].number[0]) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "virtual: leds and vibrators are whole numbers");
+  }
+  if (!entries[GRIPPER].given) {
+    return HAP_OK;
+  }
+  const hapi_motion_text text = {"gripper", "T:x in s and m", entries[GRIPPER].text,
+                                 entries[GRIPPER].length, 1};
+  return hapi_motion_set_path(motion, &text, detail);
+}
+
 static void set_info(virtual_device *device, const hapi_argument *entries)
 {
   hap_device_info *info = &device->info;
@@ -343,6 +407,9 @@ static hap_status device_configure(virtual_device *device, const char *args, hap
     status = set_turning(device, entries, detail);
   }
   if (status >= 0) {
+    status = set_gripper(device, entries, detail);
+  }
+  if (status >= 0) {
     status = set_kick(device, &table, detail);
   }
   uint64_t delay_ns = (uint64_t)llround(device->info.delay * 1e9);
@@ -358,6 +425,7 @@ static void virtual_close(void *self)
   virtual_device *device = self;
   hapi_motion_finish(&device->motion);
   hapi_motion_finish(&device->turning);
+  hapi_motion_finish(&device->gripper.motion);
   hapi_delay_finish(&device->delay);
   hapi_delay_finish(&device->torque_delay);
   hapi_free(device);
@@ -505,6 +573,14 @@ static void place_hand(virtual_device *device, uint64_t at_ns)
   }
 }
 
+static void gripper_move(virtual_device *device, uint64_t before_ns)
+{
+  uint64_t now_ns = device->timeline.elapsed_ns;
+  double force = hapi_output_is_zeroed(&device->output) ? 0.0 : device->gripper.held;
+  hapi_gripper_move(&device->gripper, device->start + hapi_timeline_seconds(before_ns),
+                    hapi_timeline_seconds(now_ns - before_ns), force);
+}
+
 static void kick_hand(virtual_device *device, uint64_t now_ns)
 {
   if (!device->kick.done && device->kick.at_ns <= now_ns) {
@@ -599,9 +675,13 @@ static hap_status virtual_read(void *self, int64_t time_ns, hap_device_input *co
   }
   if (first) {
     place_hand(device, 0);
+    hapi_gripper_place(&device->gripper, device->start, device->held);
   } else {
     device_move(device, before_ns);
+    gripper_move(device, before_ns);
   }
+  in->axes[0] = device->gripper.fingers.position[0];
+  in->axis_rates[0] = device->gripper.fingers.velocity[0];
   pose_measure(device, first, device->timeline.elapsed_ns - before_ns);
   in->twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hapi_v3_copy(device->measured.position, in->pose.position);
@@ -615,10 +695,19 @@ static hap_status virtual_write(void *self, const hap_device_output *const wante
                                 hap_device_output *const reached[])
 {
   virtual_device *device = self;
+  double push = wanted[0]->axis_forces[0];
+  double most = device->gripper.max_force;
   if (!device->timeline.running) {
     return HAP_ERROR_STATE;
   }
-  return hapi_output_write(&device->output, &wanted[0]->wrench, &reached[0]->wrench);
+  if (device->gripper.there && !hapi_finite(&push, 1)) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  device->gripper.held = device->gripper.there ? hapi_max(hapi_min(push, most), -most) : 0.0;
+  reached[0]->axis_forces[0] = device->gripper.held;
+  hap_status status = hapi_output_write(&device->output, &wanted[0]->wrench, &reached[0]->wrench);
+  bool shortened = device->gripper.there && device->gripper.held != push;
+  return status == HAP_OK && shortened ? HAP_SATURATED : status;
 }
 
 static void virtual_zero(void *self)
@@ -638,6 +727,19 @@ static void virtual_held(void *self, hap_device_output *const out[])
 {
   const virtual_device *device = self;
   hapi_output_get(&device->output, &out[0]->wrench);
+  out[0]->axis_forces[0] = hapi_output_is_zeroed(&device->output) ? 0.0 : device->gripper.held;
+}
+
+static void virtual_describe_axis(void *self, uint32_t effector, uint32_t axis, hap_axis_info *out)
+{
+  const virtual_device *device = self;
+  (void)effector;
+  (void)axis;
+  out->kind = HAP_AXIS_GRIPPER;
+  out->unit = HAP_AXIS_METRES;
+  out->low = 0.0;
+  out->high = device->gripper.high;
+  out->max_force = device->gripper.max_force;
 }
 
 void hapi_virtual_get_port(const void *self, hapi_virtual_port *out)
@@ -664,7 +766,9 @@ const hap_device_ops hapi_virtual_ops = {
         "hand=rigid|relaxed|tense|none, mass=, damping=, stiffness=, kick=T:vx/vy/vz, "
         "max_force=, max_torque=, rated_stiffness=, device_mass=, device_damping=, friction=, "
         "delay=, quantum=, dof=3|6; dof=6: turn=T:rx/ry/rz;..., turn_sine=, turn_hz=, inertia=, "
-        "turn_damping=, turn_stiffness=, device_inertia=, device_turn_damping=",
+        "turn_damping=, turn_stiffness=, device_inertia=, device_turn_damping=; "
+        "gripper=T:x;..., gripper_sine=A, gripper_hz=F, gripper_max=, gripper_force=; leds=, "
+        "vibrators=",
     .pacing = HAP_PACING_VIRTUAL,
     .open = virtual_open,
     .describe = virtual_describe,
@@ -675,4 +779,5 @@ const hap_device_ops hapi_virtual_ops = {
     .stop = virtual_stop,
     .close = virtual_close,
     .held = virtual_held,
+    .describe_axis = virtual_describe_axis,
 };
