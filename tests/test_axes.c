@@ -338,3 +338,447 @@ TEST(the_fastest_axis_is_followed)
     CHECK(hand_state(b).axes[0] == LOW + 0.0999 * RANGE * 10);
   }
 }
+
+/* ---- what is given ---- */
+
+static hap_pointer_outputs outputs_none(void)
+{
+  hap_pointer_outputs outputs;
+  hap_pointer_outputs_init(&outputs, sizeof outputs);
+  return outputs;
+}
+
+static void outputs_set(const bench *b, const hap_pointer_outputs *outputs)
+{
+  hap_detail why = {""};
+  bool good = hap_pointer_set_outputs(b->session, b->hand, outputs) == HAP_OK;
+  (void)hap_session_detail(b->session, &why);
+  REQUIRE_SAY(good, "%s", why.text);
+}
+
+/* 5 N at most, of a spring that holds the gripper at 40 mm. */
+static hap_pointer_outputs spring_outputs(void)
+{
+  hap_pointer_outputs outputs = outputs_none();
+  outputs.axes[0].stiffness = 200.0;
+  outputs.axes[0].target = 0.04;
+  outputs.axes[0].damping = 2.0;
+  outputs.axes[0].max_force = 5.0;
+  outputs.leds = 5;
+  outputs.vibrators[0] = (hap_vibration){0.5, 120.0};
+  return outputs;
+}
+
+TEST(outputs_are_written_beside_the_wrench)
+{
+  bench *b = bench_new(NULL);
+  hap_pointer_outputs outputs = spring_outputs();
+  bench_run(b, 50);
+  CHECK(b->grip.last.leds == 0 && b->grip.last.axis_forces[0] == 0.0);
+  outputs_set(b, &outputs);
+  bench_run(b, 50);
+  CHECK(b->grip.last.leds == 5 && b->grip.last.axis_forces[1] == 0.0);
+  CHECK_NEAR(b->grip.last.axis_forces[0], 200.0 * (0.04 - 0.05), 1e-12);
+  CHECK(hand_state(b).axis_forces[0] == b->grip.last.axis_forces[0]);
+  CHECK_NEAR(b->grip.last.vibrators[0].amplitude, 0.5, 1e-12);
+  CHECK(b->grip.last.vibrators[0].frequency == 120.0);
+  for (int i = 0; i < 30; ++i) { /* at 0.5 m/s, towards closed: spring and damper */
+    b->grip.at[0] -= 5e-4;
+    b->grip.rate[0] = -0.5;
+    bench_run(b, 1);
+    double wanted = 200.0 * (0.04 - b->grip.at[0]) + 2.0 * 0.5;
+    CHECK_NEAR(b->grip.last.axis_forces[0], wanted, 1e-9);
+  }
+  b->grip.rate[0] = 0.0;
+  for (int i = 0; i < 30; ++i) { /* further: to what was promised */
+    b->grip.at[0] -= 0.8e-3;
+    bench_run(b, 1);
+  }
+  CHECK_NEAR(b->grip.last.axis_forces[0], 5.0, 1e-12);
+  CHECK(hap_session_stop(b->session) == HAP_OK);
+  CHECK(b->grip.last.axis_forces[0] == 0.0 && b->grip.last.vibrators[0].amplitude == 0.0);
+  session_run(b->session); /* they stay, and come in over 20 ms */
+  bench_run(b, 10);
+  CHECK(fabs(b->grip.last.axis_forces[0]) < 0.7 * 5.0);
+  bench_run(b, 50);
+  CHECK_NEAR(b->grip.last.axis_forces[0], 5.0, 1e-12);
+  CHECK(hap_pointer_restart(b->session, b->hand) == HAP_OK);
+  CHECK(b->grip.last.axis_forces[0] == 0.0);
+  bench_run(b, 80);
+  CHECK_NEAR(b->grip.last.axis_forces[0], 5.0, 1e-12);
+}
+
+/* From +5 to -5 N in 20 ms, and no tick more than a line would. A fault cannot be faster than 2 ms
+ * from the axis's own limit. */
+TEST(a_change_of_outputs_does_not_leap)
+{
+  bench *b = bench_new(NULL);
+  hap_pointer_outputs outputs = outputs_none();
+  outputs.axes[0].force = 5.0;
+  outputs.axes[0].max_force = 5.0;
+  outputs.axes[0].max_power = 10.0;
+  outputs_set(b, &outputs);
+  bench_run(b, 100);
+  CHECK_NEAR(b->grip.last.axis_forces[0], 5.0, 1e-12);
+  for (int k = 0; k < 6; ++k) {
+    double before = b->grip.last.axis_forces[0];
+    outputs.axes[0].force = -outputs.axes[0].force;
+    outputs_set(b, &outputs);
+    for (int i = 0; i < 30; ++i) {
+      bench_run(b, 1);
+      double now = b->grip.last.axis_forces[0];
+      CHECK(fabs(now - before) <= 10.0 / 20.0 + 1e-9);
+      CHECK(fabs(now) <= 5.0 + 1e-12);
+      before = now;
+    }
+    CHECK_NEAR(before, outputs.axes[0].force, 1e-12);
+  }
+  b->grip.at[0] = 0.02; /* a jump of the axis moves nothing but the spring, which comes slowly */
+  outputs = spring_outputs();
+  outputs_set(b, &outputs);
+  bench_run(b, 50);
+  double before = b->grip.last.axis_forces[0];
+  b->grip.at[0] = 0.06;
+  for (int i = 0; i < 60; ++i) {
+    bench_run(b, 1);
+    CHECK(fabs(b->grip.last.axis_forces[0] - before) <= 8.0 / 20.0 + 1e-9);
+    before = b->grip.last.axis_forces[0];
+  }
+  CHECK_NEAR(before, 200.0 * (0.04 - 0.06), 1e-12);
+}
+
+static void grip_hold(bench *b)
+{
+  hap_pointer_outputs outputs = spring_outputs();
+  outputs_set(b, &outputs);
+  bench_run(b, 60);
+  CHECK_NEAR(b->grip.last.axis_forces[0], -2.0, 1e-12);
+  CHECK_NEAR(b->grip.last.vibrators[0].amplitude, 0.5, 1e-12);
+}
+
+static bool grip_gives(const bench *b)
+{
+  return b->grip.last.axis_forces[0] != 0.0 || b->grip.last.vibrators[0].amplitude != 0.0;
+}
+
+/* At once where the device or somebody has taken the force, else within a slew. */
+TEST(a_fault_takes_outputs_off)
+{
+  for (int kind = 0; kind < 4; ++kind) {
+    static const int ticks[] = {1, 1, 30, 25};
+    bench *b = bench_new(NULL);
+    grip_hold(b);
+    if (kind == 0) {
+      hap_emergency_zero();
+      CHECK(!grip_gives(b)); /* before any tick */
+    }
+    b->grip.status = kind == 1 ? HAP_ERROR_DEVICE : kind == 2 ? HAP_STALE : HAP_OK;
+    b->grip.height = kind == 3 ? (double)NAN : b->grip.height;
+    bench_run(b, (uint32_t)ticks[kind]);
+    CHECK_SAY(!grip_gives(b), "%d: %g", kind, b->grip.last.axis_forces[0]);
+    CHECK(bench_fault(b) != HAP_FAULT_NONE);
+    CHECK(b->grip.last.leds == 5 || kind == 1); /* no force, and they may say why */
+    b->grip.status = HAP_OK;
+    b->grip.height = 0.1;
+    bench_run(b, 30);
+    CHECK(!grip_gives(b));
+    CHECK(hap_session_reset_fault(b->session) >= HAP_OK);
+    bench_run(b, 5);
+    CHECK(fabs(b->grip.last.axis_forces[0]) < 1.0); /* and back over 20 ms */
+    bench_run(b, 60);
+    CHECK_NEAR(b->grip.last.axis_forces[0], -2.0, 1e-12);
+    tap_release(b);
+  }
+}
+
+TEST(a_held_clutch_takes_outputs_off)
+{
+  bench *b = bench_new(NULL);
+  grip_hold(b);
+  CHECK(hap_pointer_clutch(b->session, b->hand, true) == HAP_OK);
+  bench_run(b, 25);
+  CHECK(!grip_gives(b));
+  CHECK(hap_pointer_clutch(b->session, b->hand, false) == HAP_OK);
+  bench_run(b, 60);
+  CHECK_NEAR(b->grip.last.axis_forces[0], -2.0, 1e-12);
+  CHECK(hap_pointer_remove(b->session, b->hand) == HAP_OK);
+  CHECK(!grip_gives(b));
+}
+
+/* A finger that opens 80 mm in a second and closes again, under a constant force of 5 N that opens:
+ * each way would be 0.4 J. Of a promised power and what is kept for 0.1 s the opening one gets no
+ * more than that, and the closing one is held back with all of the force. */
+TEST(an_axis_keeps_its_promise_of_power)
+{
+  static const double powers[] = {0.1, 0.0, 10.0};
+  for (int k = 0; k < 3; ++k) {
+    bench *b = bench_new(NULL);
+    hap_pointer_outputs outputs = outputs_none();
+    outputs.axes[0].force = outputs.axes[0].max_force = 5.0;
+    outputs.axes[0].max_power = powers[k];
+    outputs_set(b, &outputs);
+    bench_run(b, 100);
+    for (int way = 0; way < 4; ++way) {
+      double work = 0.0;
+      double speed = way % 2 == 0 ? -0.05 : 0.05;
+      for (int i = 0; i < 1000; ++i) {
+        double force = b->grip.last.axis_forces[0];
+        b->grip.at[0] += speed * 1e-3;
+        b->grip.rate[0] = speed;
+        bench_run(b, 1);
+        work += force * speed * 1e-3;
+      }
+      double most = 1.1 * powers[k] + 5.0 * 1e-4;
+      CHECK_SAY(speed < 0.0 || work <= most, "%g W, way %d: %g J", powers[k], way, work);
+      CHECK_SAY(work <= -0.99 * 0.25 || speed > 0.0, "%g W, way %d: %g J", powers[k], way, work);
+      CHECK_SAY(work >= fmin(0.9 * powers[k], 0.99 * 0.25) || speed < 0.0, "%g", work);
+      CHECK((hand_state(b).guard & HAP_GUARD_OWN) != 0 || speed < 0.0 || powers[k] > 1.0);
+    }
+    tap_release(b);
+  }
+}
+
+/* Relaxed fingers of the virtual device against a spring: where both springs agree. */
+TEST(fingers_yield_to_a_spring)
+{
+  bench *b = bench_new("virtual:hand=relaxed,gripper=0:0.06");
+  hap_pointer_outputs outputs = outputs_none();
+  outputs.axes[0].stiffness = 50.0;
+  outputs.axes[0].target = 0.0;
+  outputs.axes[0].max_force = 8.0;
+  outputs_set(b, &outputs);
+  bench_run(b, 3000);
+  hap_pointer_state state = hand_state(b);
+  CHECK_NEAR(state.axes[0], 100.0 * 0.06 / 150.0, 1e-5);
+  CHECK_NEAR(state.axis_forces[0], -50.0 * state.axes[0], 1e-3);
+}
+
+typedef struct wrong_outputs {
+  void (*spoil)(hap_pointer_outputs *io);
+  const char *names; /* in the detail */
+} wrong_outputs;
+
+static void spoil_led(hap_pointer_outputs *io)
+{
+  io->leds = 8;
+}
+static void spoil_vibrator(hap_pointer_outputs *io)
+{
+  io->vibrators[1].amplitude = 0.1;
+}
+static void spoil_amplitude(hap_pointer_outputs *io)
+{
+  io->vibrators[0].amplitude = 1.1;
+}
+static void spoil_frequency(hap_pointer_outputs *io)
+{
+  io->vibrators[0].frequency = NAN;
+}
+static void spoil_axis(hap_pointer_outputs *io)
+{
+  io->axes[2].force = io->axes[2].max_force = 1.0;
+}
+static void spoil_weak(hap_pointer_outputs *io)
+{
+  io->axes[1].force = io->axes[1].max_force = 1.0;
+}
+static void spoil_bound(hap_pointer_outputs *io)
+{
+  io->axes[0].max_force = 0.0;
+}
+static void spoil_target(hap_pointer_outputs *io)
+{
+  io->axes[0].target = HIGH + 0.01;
+}
+static void spoil_force(hap_pointer_outputs *io)
+{
+  io->axes[0].force = INFINITY;
+}
+static void spoil_damping(hap_pointer_outputs *io)
+{
+  io->axes[0].damping = -1.0;
+}
+static void spoil_power(hap_pointer_outputs *io)
+{
+  io->axes[0].max_power = -2.0;
+}
+static void spoil_closed(hap_pointer_outputs *io)
+{
+  io->gripper_closed = io->gripper_open;
+}
+
+TEST(outputs_that_cannot_be_say_why)
+{
+  static const wrong_outputs wrong[] = {{spoil_led, "leds"},
+                                        {spoil_vibrator, "vibrators[1]"},
+                                        {spoil_amplitude, "amplitude"},
+                                        {spoil_frequency, "frequency"},
+                                        {spoil_axis, "axes[2]"},
+                                        {spoil_weak, "axes[1]"},
+                                        {spoil_bound, "max_force"},
+                                        {spoil_target, "target"},
+                                        {spoil_force, "axes[0]"},
+                                        {spoil_damping, "axes[0]"},
+                                        {spoil_power, "axes[0]"},
+                                        {spoil_closed, "gripper_closed"}};
+  bench *b = bench_new(NULL);
+  hap_detail why;
+  grip_hold(b);
+  for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
+    hap_pointer_outputs outputs = spring_outputs();
+    wrong[i].spoil(&outputs);
+    CHECK(hap_pointer_set_outputs(b->session, b->hand, &outputs) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_detail(b->session, &why) >= HAP_OK);
+    CHECK_SAY(strstr(why.text, wrong[i].names) != NULL, "%s: %s", wrong[i].names, why.text);
+  }
+  bench_run(b, 30);
+  CHECK_NEAR(b->grip.last.axis_forces[0], -2.0, 1e-12); /* nothing has changed */
+  hap_pointer_outputs outputs = spring_outputs();
+  hap_pointer_outputs bare;
+  memset(&bare, 0, sizeof bare);
+  CHECK(hap_pointer_set_outputs(b->session, b->hand, &bare) == HAP_ERROR_UNINITIALISED);
+  CHECK(hap_pointer_set_outputs(NULL, b->hand, &outputs) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_set_outputs(b->session, (hap_pointer_id){77}, &outputs) == HAP_ERROR_NOT_FOUND);
+  hap_pointer_def def;
+  hap_pointer_id free_hand;
+  hap_pointer_def_init(&def, sizeof def);
+  REQUIRE(hap_pointer_add(b->session, &def, &free_hand) == HAP_OK);
+  CHECK(hap_pointer_set_outputs(b->session, free_hand, &outputs) == HAP_ERROR_UNSUPPORTED);
+}
+
+/* ---- events ---- */
+
+static size_t gripper_events(bench *b, hap_event *out, size_t capacity)
+{
+  hap_event all[64];
+  size_t count = 0;
+  size_t kept = 0;
+  (void)hap_session_events(b->session, all, 64, sizeof all[0], &count);
+  for (size_t i = 0; i < count && kept < capacity; ++i) {
+    if (all[i].kind == HAP_EVENT_GRIPPER) {
+      out[kept++] = all[i];
+    }
+  }
+  return kept;
+}
+
+/* From closed over open and back, with noise at the threshold: one event for each crossing. */
+TEST(a_gripper_that_closes_and_opens_is_told_once_each)
+{
+  hap_event events[8];
+  bench *b = bench_new(NULL);
+  CHECK(gripper_events(b, events, 8) == 0);
+  for (int i = 0; i < 400; ++i) { /* 75 mm down and up, 1 mm of noise */
+    double way = i < 200 ? i / 200.0 : 2.0 - i / 200.0;
+    b->grip.at[0] = HIGH - 0.075 * way + (i % 2 == 0 ? 0.0005 : -0.0005);
+    b->grip.rate[0] = i < 200 ? -0.3 : 0.3;
+    bench_run(b, 1);
+  }
+  size_t count = gripper_events(b, events, 8);
+  REQUIRE_SAY(count == 2, "%zu", count);
+  CHECK(events[0].is_down == 1 && events[0].number == 0 && events[0].speed == -0.3);
+  CHECK(events[1].is_down == 0 && events[1].speed == 0.3 && events[1].geom == NULL);
+  CHECK(events[0].pointer.v == b->hand.v && events[1].time_ns > events[0].time_ns);
+  /* Closed at 0.25 of the range, 10 mm: after 60 of 75 mm, 160 ms; open at 18 mm. */
+  CHECK_NEAR(1e-6 * (double)(events[1].time_ns - events[0].time_ns), 40.0 + 61.0, 6.0);
+  CHECK(strcmp(hap_event_name(HAP_EVENT_GRIPPER), "gripper") == 0);
+  hap_pointer_outputs outputs = outputs_none(); /* 0.9 and 0.95: closed as soon as it is set */
+  outputs.gripper_closed = 0.9;
+  outputs.gripper_open = 0.95;
+  b->grip.at[0] = 0.05;
+  outputs_set(b, &outputs);
+  bench_run(b, 20);
+  count = gripper_events(b, events, 8);
+  CHECK(count == 1 && events[0].is_down == 1);
+}
+
+/* ---- workspace ---- */
+
+TEST(a_workspace_that_the_device_tells_is_fitted)
+{
+  const hap_pose box = {{1.0, 2.0, 3.0}, {1.0, 0.0, 0.0, 0.0}};
+  bench *b = bench_new(NULL);
+  hap_pointer_settings settings;
+  hap_pointer_settings_init(&settings, sizeof settings);
+  CHECK(hap_pointer_fit_workspace(b->session, b->hand, NULL, NULL, &box, AT(0.8, 0.3, 0.2)) ==
+        HAP_OK);
+  CHECK(hap_pointer_settings_get(b->session, b->hand, &settings) == HAP_OK);
+  CHECK_NEAR(settings.motion_scale, 2.0, 1e-12); /* 0.8 m of 0.4 m */
+  CHECK_NEAR(settings.pose_world_device.position[0], 1.0 - 2.0 * 0.1, 1e-12);
+  CHECK_NEAR(settings.pose_world_device.position[2], 3.0, 1e-12);
+  CHECK(hap_pointer_fit_workspace(b->session, b->hand, AT(0, 0, 0), NULL, &box, AT(1, 1, 1)) ==
+        HAP_ERROR_ARGUMENT);
+  tap_release(b);
+  b = bench_new("virtual");
+  CHECK(hap_pointer_fit_workspace(b->session, b->hand, NULL, NULL, &box, AT(1, 1, 1)) ==
+        HAP_ERROR_UNSUPPORTED);
+  hap_detail why;
+  CHECK(hap_session_detail(b->session, &why) >= HAP_OK && strstr(why.text, "workspace") != NULL);
+}
+
+/* ---- recordings ---- */
+
+/* A virtual device, as a replay has none: gripper, spring on it, thresholds, all set while it runs,
+ * one before the first tick. */
+TEST(a_replay_has_axes_and_outputs_bit_for_bit)
+{
+  hap_detail detail = {""};
+  hap_record_def file;
+  hap_player *player = NULL;
+  hap_expert_def expert;
+  hap_research_def research;
+  hap_pointer_outputs outputs = outputs_none();
+  REQUIRE(folder_make());
+  hap_record_def_init(&file, sizeof file);
+  file.path = folder_path("axes.rec");
+  bench *b = bench_bare();
+  b->def.drive = HAP_DRIVE_THREADS;
+  b->def.rt_priority = 0;
+  REQUIRE(hap_device_open("virtual:hand=relaxed,gripper=0:0.04,gripper_sine=0.03,gripper_hz=3,"
+                          "sine=0/0/0.01,vibrators=2,leds=4",
+                          &b->device, &detail) == HAP_OK);
+  bench_session(b);
+  REQUIRE(hap_session_record(b->session, &file, &detail) == HAP_OK);
+  bench_hand(b);
+  outputs.axes[0] = (hap_axis_push){.stiffness = 60.0, .max_force = 4.0, .max_power = 0.2};
+  outputs.leds = 3;
+  outputs_set(b, &outputs);
+  session_run(b->session);
+  for (int i = 0; i < 20; ++i) {
+    const struct timespec wait = {.tv_nsec = 20000000};
+    (void)nanosleep(&wait, NULL);
+    outputs.axes[0].target = 0.004 * i;
+    outputs.vibrators[1] = (hap_vibration){0.05 * i, 100.0};
+    outputs_set(b, &outputs);
+  }
+  hap_pointer_state state = hand_state(b);
+  CHECK(state.axis_count == 1 && state.axis_forces[0] != 0.0);
+  hap_pointer_id hand = b->hand;
+  CHECK(hap_session_stop(b->session) == HAP_OK);
+  tap_release(b);
+
+  bench *r = bench_bare();
+  hap_expert_def_init(&expert, sizeof expert);
+  hap_research_def_init(&research, sizeof research);
+  REQUIRE(hap_player_open(file.path, HAP_PLAY_WHOLE, &player, &detail) >= HAP_OK);
+  REQUIRE(hap_player_get_def(player, &r->def, &expert, &research) >= HAP_OK);
+  bench_session(r);
+  REQUIRE(hap_session_play(r->session, player, &detail) >= HAP_OK);
+  session_run(r->session);
+  hap_status status = HAP_OK;
+  double least = 1.0;
+  double most = 0.0;
+  for (r->hand = hand; status == HAP_OK;) {
+    status = hap_session_advance(r->session, 1);
+    state = hand_state(r);
+    least = fmin(least, state.axes[0]);
+    most = fmax(most, state.axes[0]);
+  }
+  (void)hap_session_detail(r->session, &detail);
+  REQUIRE_SAY(status == HAP_END, "%s", detail.text);
+  CHECK(state.axis_count == 1 && most - least > 0.02);
+  CHECK(hap_pointer_set_outputs(r->session, hand, &outputs) == HAP_ERROR_STATE);
+  hap_session_destroy(r->session);
+  r->session = NULL;
+  hap_player_close(player);
+}

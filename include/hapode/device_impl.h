@@ -35,8 +35,8 @@ typedef enum hap_device_pacing {
   HAP_PACING_DEVICE = 2   /* read blocks until the device's own tick, at most two ticks */
 } hap_device_pacing;
 
-/* What an end effector measures. Sessions use pose, twist and buttons; axes are for wrappers and
- * for --check-device as yet. It has a size, set by the library, and may grow at its end. */
+/* What an end effector measures. Sessions judge axes as they judge the pose, and tell them in
+ * hap_pointer_state. It has a size, set by the library, and may grow at its end. */
 typedef struct hap_device_input {
   uint32_t size;    /* bytes that there is room for */
   uint32_t buttons; /* bit 0 is the first one */
@@ -46,8 +46,9 @@ typedef struct hap_device_input {
   double axis_rates[HAP_AXES_MAX]; /* of those, a second */
 } hap_device_input;
 
-/* What an end effector shall do, or does. Sessions set the wrench and leave the rest 0 as yet. It
- * has a size, set by the library, and may grow at its end. */
+/* What an end effector shall do, or does. Sessions leave what is not the wrench 0 until the
+ * application calls hap_pointer_set_outputs (hapode/outputs.h). It has a size, set by the library,
+ * and may grow at its end. */
 typedef struct hap_device_output {
   uint32_t size;                    /* bytes that are filled in, or that there is room for */
   uint32_t leds;                    /* bit 0 is the first one */

@@ -14,6 +14,7 @@
 #include <hapode/forces.h>
 #include <hapode/hooks.h>
 #include <hapode/identify.h>
+#include <hapode/outputs.h>
 #include <hapode/pointer.h>
 #include <hapode/pointer_set.h>
 #include <hapode/record.h>

@@ -203,7 +203,8 @@ typedef struct hap_pointer_state {
   uint32_t axis_count; /* 0: none */
   uint32_t reserved;
   double axes[HAP_AXES_MAX];
-  double axis_rates[HAP_AXES_MAX]; /* of those, a second */
+  double axis_rates[HAP_AXES_MAX];  /* of those, a second */
+  double axis_forces[HAP_AXES_MAX]; /* what was written to the device (outputs.h) */
 } hap_pointer_state;
 
 /* [any] State after the newest tick. size_of_out: sizeof *out of the caller's build.

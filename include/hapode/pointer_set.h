@@ -104,10 +104,12 @@ HAP_API hap_status hap_pointer_clutch(hap_session *session, hap_pointer_id point
 /* [any] Sets base, motion scale and HAP_SET_UNCLUTCHED so that a box of the world can be reached:
  * the middle of the device's box, device_lo to device_hi in m in its frame, comes to the middle of
  * the world's, which has edges in m along the axes of pose_world_box. The device's axes become
- * those of that box, and the scale is the least with which all of it can be reached.
+ * those of that box, and the scale is the least with which all of it can be reached. device_lo and
+ * device_hi both NULL: the device's box is the workspace of its hap_device_info.
  *
- * HAP_ERROR_ARGUMENT: a NULL, an edge that is not above 0, or a scale or pose out of range. Others
- * as of hap_pointer_set. */
+ * HAP_ERROR_ARGUMENT: another NULL, an edge that is not above 0, or a scale or pose out of range.
+ * HAP_ERROR_UNSUPPORTED: both NULL, and the device does not tell its workspace. Others as of
+ * hap_pointer_set. */
 HAP_API hap_status hap_pointer_fit_workspace(hap_session *session, hap_pointer_id pointer,
                                              const double device_lo[3], const double device_hi[3],
                                              const hap_pose *pose_world_box, const double edges[3]);

@@ -88,23 +88,27 @@ typedef enum hap_event_kind {
    * any more, or 20 ms are over */
   HAP_EVENT_IMPACT = 5,
   HAP_EVENT_BUTTON = 6, /* pressed or let go */
-  HAP_EVENT_FAULT = 7   /* the guard has taken the force away */
+  HAP_EVENT_FAULT = 7,  /* the guard has taken the force away */
+  /* A gripper has closed or opened: see hap_pointer_outputs.gripper_closed. It begins open. */
+  HAP_EVENT_GRIPPER = 8
 } hap_event_kind;
 
 /* Something that has happened. Its size goes with the call; it may grow at its end. What a kind
  * does not have is 0. */
 typedef struct hap_event {
   uint32_t kind;          /* hap_event_kind */
-  uint32_t number;        /* BUTTON: from 0; FAULT: hap_fault */
+  uint32_t number;        /* BUTTON, GRIPPER (its axis): from 0; FAULT: hap_fault */
   int64_t time_ns;        /* of the tick, on the clock of hap_session_now */
   hap_pointer_id pointer; /* FAULT: v is 0 where it came from none */
-  void *geom;             /* as in hap_touch; NULL for BUTTON and FAULT */
+  void *geom;             /* as in hap_touch; NULL for BUTTON, FAULT and GRIPPER */
   void *body;
   double point[3];  /* m, world */
   double normal[3]; /* unit, world, out of the geom */
-  double speed;     /* m/s. TOUCH, IMPACT: at which they closed; SLIDE: along the surface */
+  /* m/s. TOUCH, IMPACT: at which they closed; SLIDE: along the surface. GRIPPER: rate of its axis,
+   * in the unit of the axis a second */
+  double speed;
   double impulse;   /* N s, along the normal. IMPACT: of the blow; RELEASE: of the whole touch */
-  uint32_t is_down; /* BUTTON: 1 pressed, 0 let go */
+  uint32_t is_down; /* BUTTON: 1 pressed, 0 let go; GRIPPER: 1 closed, 0 open */
   uint32_t reserved;
 } hap_event;
 

@@ -82,6 +82,7 @@
 #define HAPI_SAFETY_OWN_SPEED 1.0   /* m/s */
 #define HAPI_SAFETY_OWN_SPIN 10.0   /* rad/s */
 #define HAPI_SAFETY_OWN_SLIP 1e-4   /* m */
+#define HAPI_SAFETY_AXIS_DRIVE 2.0  /* 1/s */
 #define HAPI_SAFETY_OWN_MASS 0.05   /* kg */
 #define HAPI_SAFETY_OWN_DAMPING 0.5 /* 1 */
 

@@ -209,6 +209,13 @@ static void limit_unexplained(const hapi_tick_facts *facts, hapi_pointer *p)
   hapi_v3_copy(p->frame.carries.linear, g->change.carried);
 }
 
+double hapi_guard_share(const hapi_guard *guard, const hapi_pointer *pointer)
+{
+  const hapi_guard_pointer *g = &pointer->guard;
+  return g->share * (1.0 - guard->age_loss) * (1.0 - pointer->belief.loss) * (1.0 - g->late_loss) *
+         (1.0 - g->swings.taken);
+}
+
 /* What the device shall get before the limits. */
 static void pointer_want(const hapi_guard *guard, const hapi_tick_facts *facts, hapi_pointer *p)
 {
@@ -240,8 +247,7 @@ static void pointer_want(const hapi_guard *guard, const hapi_tick_facts *facts, 
   g->share = waits      ? 0.0
              : g->fades ? hapi_max(g->share - step, 0.0)
                         : hapi_min(g->share + step, 1.0);
-  double share = g->share * (1.0 - guard->age_loss) * (1.0 - p->belief.loss) *
-                 (1.0 - g->late_loss) * (1.0 - g->swings.taken);
+  double share = hapi_guard_share(guard, p);
   g->flags |= g->share < 1.0 ? HAP_GUARD_RAMP_IN : 0;
   g->flags |= guard->age_loss > 0.0 ? HAP_GUARD_STALE : 0;
   g->flags |= p->belief.doubted || p->belief.loss > 0.0 ? HAP_GUARD_INPUT : 0;

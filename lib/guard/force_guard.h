@@ -24,6 +24,9 @@ bool hapi_guard_usable(const hap_wrench *wrench);
 void hapi_guard_begin(hapi_guard *guard, const hapi_tick_facts *facts,
                       const hapi_pointers *pointers);
 
+/* 0..1, what ramp, age, doubt, lateness and swings leave of the force in this tick. */
+double hapi_guard_share(const hapi_guard *guard, const hapi_pointer *pointer);
+
 /* The limits, and what is reported. */
 void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *pointers);
 

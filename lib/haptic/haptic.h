@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include <hapode/effects.h>
+#include <hapode/outputs.h>
 #include <hapode/pointer.h>
 #include <hapode/session.h>
 #include <hapode/stats.h>
@@ -81,6 +82,12 @@ hap_status hapi_haptic_set_pointer(hapi_haptic *haptic, hap_pointer_id id, hapi_
                                    const void *of, hap_detail *detail);
 hap_status hapi_haptic_get_settings(hapi_haptic *haptic, hap_pointer_id id,
                                     hapi_pointer_setting *out);
+/* [any] outputs.h */
+hap_status hapi_haptic_set_outputs(hapi_haptic *haptic, hap_pointer_id id,
+                                   const hap_pointer_outputs *outputs, hap_detail *detail);
+/* [any] Of its device; HAP_ERROR_UNSUPPORTED: that does not tell one. */
+hap_status hapi_haptic_workspace(hapi_haptic *haptic, hap_pointer_id id, double out_low[3],
+                                 double out_high[3]);
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out);
 bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id);
 /* [any] Pointer and device in the world at time_ns; HAP_STALE: later than the newest tick by more

@@ -17,6 +17,7 @@
 #include "device/device.h"
 #include "device/watchdog.h"
 #include "haptic/haptic.h"
+#include "haptic/outputs_box.h"
 #include "haptic/own_list.h"
 #include "haptic/settings_box.h"
 #include "record/tape.h"
@@ -59,6 +60,7 @@ typedef struct hapi_pointer_slot {
   hapi_triple_buffer state_buffer;
   hap_pointer_state states[3];
   hapi_pointer_settings_box set;
+  hapi_outputs_box outputs;
 } hapi_pointer_slot;
 
 /* Published for the statistics; each written by the haptic thread alone. */

@@ -268,6 +268,7 @@ static void pointers_cut(hapi_haptic *haptic)
 {
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
     hapi_guard_cut(&haptic->tick.pointers.of[i]);
+    hapi_outputs_cut(&haptic->tick.outputs[i]);
   }
 }
 

@@ -13,6 +13,7 @@
 #include "guard/force_guard.h"
 #include "haptic/axes.h"
 #include "haptic/coupling_gains.h"
+#include "haptic/outputs.h"
 #include "haptic/own_forces.h"
 #include "pointer/coupling.h"
 #include "pointer/frame.h"
@@ -61,6 +62,7 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   p->pose.quat_wxyz[0] = 1.0;
   hapi_own_begin(haptic, index);
   hapi_axes_join(haptic, index);
+  hapi_outputs_join(haptic, index);
 }
 
 /* For a new user of the slot, whose def is in it. */
@@ -81,6 +83,7 @@ static void slot_prepare(hapi_pointer_slot *slot)
     slot->states[i].size = sizeof slot->states[i];
   }
   hapi_settings_prepare(slot);
+  hapi_outputs_prepare(slot);
   pthread_mutex_unlock(&slot->lock);
 }
 
@@ -181,6 +184,7 @@ static void fail_device(hapi_haptic *haptic, uint32_t index, hap_fault fault)
     slot->ops->zero(slot->self);
   }
   hapi_guard_cut(&haptic->tick.pointers.of[index]);
+  hapi_outputs_cut(&haptic->tick.outputs[index]);
   hapi_tick_fault(&haptic->tick, fault, index + 1);
 }
 
@@ -227,6 +231,10 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
     if (p->glides.any || hapi_triple_is_fresh(&slot->set.buffer) || hapi_tape_plays(haptic->tape)) {
       hapi_settings_follow(haptic, i, now_ns);
     }
+    if (slot->outputs.again || hapi_triple_is_fresh(&slot->outputs.buffer) ||
+        hapi_tape_plays(haptic->tape)) {
+      hapi_outputs_take(haptic, i);
+    }
     hapi_pointer_input in = {.pose = p->device.pose};
     if (!hapi_tape_plays(haptic->tape)) {
       ask_device(haptic, i, now_ns, &in);
@@ -262,7 +270,12 @@ static void device_fill(hapi_haptic *haptic, uint32_t index)
 {
   const hapi_pointer_slot *slot = &haptic->slots[index];
   hap_device *device = slot->def.device;
-  slot->effector->wanted.wrench = haptic->tick.pointers.of[index].device.wrench;
+  const hapi_pointer *p = &haptic->tick.pointers.of[index];
+  slot->effector->wanted.wrench = p->device.wrench;
+  if (p->drives) {
+    hapi_outputs_fill(&haptic->tick.outputs[index], &haptic->tick.axes[index],
+                      &slot->effector->wanted);
+  }
   if (++device->drive.filled >= device->drive.active) {
     hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_WRITE, index);
     device->drive.filled = 0;
@@ -309,12 +322,14 @@ static hap_wrench declared_felt(const hapi_pointer *p)
   return felt;
 }
 
-static void axes_tell(const hapi_axes *axes, hap_pointer_state *out)
+static void axes_tell(const hapi_tick *tick, uint32_t index, hap_pointer_state *out)
 {
+  const hapi_axes *axes = &tick->axes[index];
   out->axis_count = axes->count;
   for (uint32_t i = 0; i < axes->count; ++i) {
     out->axes[i] = axes->of[i].at;
     out->axis_rates[i] = axes->of[i].rate;
+    out->axis_forces[i] = tick->outputs[index].axes[i].force;
   }
 }
 
@@ -347,7 +362,7 @@ void hapi_pointers_publish(hapi_haptic *haptic)
         .own = p->declared.any ? declared_felt(p) : (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}},
     };
     if (p->has_axes) {
-      axes_tell(&haptic->tick.axes[i], state);
+      axes_tell(&haptic->tick, i, state);
     }
     hapi_triple_publish(&slot->state_buffer);
   }
@@ -752,6 +767,23 @@ hap_status hapi_haptic_get_settings(hapi_haptic *haptic, hap_pointer_id id,
   *out = slot->set.newest.value;
   pthread_mutex_unlock(&slot->lock);
   return HAP_OK;
+}
+
+hap_status hapi_haptic_workspace(hapi_haptic *haptic, hap_pointer_id id, double out_low[3],
+                                 double out_high[3])
+{
+  hapi_pointer_slot *slot = hapi_slot_lock(haptic, id);
+  bool known = true;
+  if (slot == NULL) {
+    return HAP_ERROR_NOT_FOUND;
+  }
+  hapi_v3_copy(slot->info.workspace_low, out_low);
+  hapi_v3_copy(slot->info.workspace_high, out_high);
+  pthread_mutex_unlock(&slot->lock);
+  for (int i = 0; i < 3; ++i) {
+    known = known && out_low[i] < out_high[i];
+  }
+  return known ? HAP_OK : HAP_ERROR_UNSUPPORTED;
 }
 
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out)

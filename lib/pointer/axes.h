@@ -11,6 +11,10 @@
 
 #include <hapode/device.h>
 
+/* Of the range of a gripper, unless the application sets others. */
+#define HAPI_GRIPPER_CLOSED 0.25
+#define HAPI_GRIPPER_OPEN 0.35
+
 /* Another value than the one that is believed, and values that go on from there. */
 typedef struct hapi_axis_elsewhere {
   bool known;

@@ -11,6 +11,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include <hapode/outputs.h>
+
 #include "base/assert.h"
 #include "base/force_setup.h"
 #include "base/hash.h"
@@ -43,6 +45,7 @@ typedef enum hapi_cell_kind {
   HAPI_CELL_OWN =
       12, /* an own force is set: HAPI_OWN_CELLS of them, a hapi_force_setup; word: its place */
   HAPI_CELL_SAMPLES = 13, /* behind the OWNs of a vibration that has them: floats */
+  HAPI_CELL_OUTPUTS = 25, /* before the POSE: HAPI_OUTPUTS_CELLS of them, a hap_pointer_outputs */
   HAPI_CELL_AXIS = 26,    /* behind the JOINs and HULLs, for each axis of the device: d[0] low, d[1]
                           high, d[2] max_force; word: kind, and from the second byte on the unit */
   HAPI_CELL_AXES = 27,    /* behind the TWIST: values, then rates, of all axes of the pointer */
@@ -201,6 +204,11 @@ static_assert(sizeof(hapi_pointer_setting) <= HAPI_SET_CELLS * HAPI_CELL_BYTES,
 
 static_assert(sizeof(hapi_force_setup) <= HAPI_OWN_CELLS * HAPI_CELL_BYTES, "room in the cells");
 
+#define HAPI_OUTPUTS_CELLS 9u
+
+static_assert(sizeof(hap_pointer_outputs) <= HAPI_OUTPUTS_CELLS * HAPI_CELL_BYTES,
+              "room in the cells");
+
 #define HAPI_AXES_CELLS ((2u * HAP_AXES_MAX + HAPI_CELL_NUMBERS - 1u) / HAPI_CELL_NUMBERS)
 
 #define HAPI_HULL_CELLS(points) (((uint32_t)(points) + 1u) / 2u)
@@ -209,10 +217,11 @@ static_assert(sizeof(hapi_force_setup) <= HAPI_OWN_CELLS * HAPI_CELL_BYTES, "roo
   (((uint32_t)(samples) + HAPI_CELL_SAMPLE_COUNT - 1u) / HAPI_CELL_SAMPLE_COUNT)
 
 /* Of a tick with everything in it; 64 vertices are the most, and one set of samples is taken. */
-#define HAPI_PACKET_MAX                                                            \
-  (1u +                                                                            \
-   16u * (1u + HAPI_JOIN_CELLS + 2u * HAPI_HULL_CELLS(64u) + HAPI_SET_CELLS +      \
-          HAP_FORCES_MAX * HAPI_OWN_CELLS + HAP_AXES_MAX + HAPI_AXES_CELLS + 4u) + \
+#define HAPI_PACKET_MAX                                                                           \
+  (1u +                                                                                           \
+   16u * (1u + HAPI_JOIN_CELLS + 2u * HAPI_HULL_CELLS(64u) + HAPI_SET_CELLS +                     \
+          HAP_FORCES_MAX * HAPI_OWN_CELLS + HAP_AXES_MAX + HAPI_AXES_CELLS + HAPI_OUTPUTS_CELLS + \
+          4u) +                                                                                   \
    HAPI_SAMPLES_CELLS(HAP_FORCE_SAMPLES_MAX) + HAPI_CELL_BODIES)
 
 #endif

@@ -179,14 +179,33 @@ static bool boxes_scale(const double device_lo[3], const double device_hi[3], co
   return true;
 }
 
+/* Of the device, where both are NULL. */
+static hap_status workspace_of(hap_session *session, hap_pointer_id pointer, const double **io_lo,
+                               const double **io_hi, double room[2][3])
+{
+  if (*io_lo != NULL || *io_hi != NULL) {
+    return HAP_OK;
+  }
+  hap_status status = hapi_haptic_workspace(session->haptic, pointer, room[0], room[1]);
+  *io_lo = room[0];
+  *io_hi = room[1];
+  return status == HAP_ERROR_UNSUPPORTED
+             ? hapi_session_fail(session, status,
+                                 "the device does not tell its workspace: give device_lo and "
+                                 "device_hi")
+             : hapi_session_say_why_not(session, pointer, status);
+}
+
 hap_status hap_pointer_fit_workspace(hap_session *session, hap_pointer_id pointer,
                                      const double device_lo[3], const double device_hi[3],
                                      const hap_pose *pose_world_box, const double edges[3])
 {
   double middle[3];
+  double room[2][3];
   hap_pointer_settings settings;
   hap_pointer_settings_init(&settings, sizeof settings);
   HAPI_TRY(hapi_session_may_change(session));
+  HAPI_TRY(workspace_of(session, pointer, &device_lo, &device_hi, room));
   if (device_lo == NULL || device_hi == NULL || pose_world_box == NULL || edges == NULL) {
     return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
   }

@@ -353,11 +353,15 @@ void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out)
 uint64_t hapi_tick_hash_axes(const hapi_tick *tick, uint32_t pointer, uint64_t hash)
 {
   const hapi_pointer *p = &tick->pointers.of[pointer];
+  const hapi_outputs *outputs = p->drives ? &tick->outputs[pointer] : NULL;
   for (uint32_t i = 0; p->has_axes && i < tick->axes[pointer].count; ++i) {
     hash = hapi_hash_doubles(hash, &tick->axes[pointer].of[i].at, 1);
     hash = hapi_hash_doubles(hash, &tick->axes[pointer].of[i].rate, 1);
   }
-  return hash;
+  for (uint32_t i = 0; outputs != NULL && i < HAP_AXES_MAX; ++i) {
+    hash = hapi_hash_doubles(hash, &outputs->axes[i].force, 1);
+  }
+  return outputs != NULL ? hapi_hash_doubles(hash, outputs->amplitudes, HAP_VIBRATORS_MAX) : hash;
 }
 
 uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash)

@@ -17,7 +17,7 @@ void hapi_tick_report_trail(const hapi_tick *tick, hapi_trail *trail);
 void hapi_tick_report_path(const hapi_tick *tick, hapi_path *path);
 void hapi_tick_trace(const hapi_tick *tick, hap_trace_row *out);
 
-/* Of the axes of a pointer, on top of a hash before; of none that one. */
+/* Of the axes and outputs of a pointer, on top of a hash before; of none that one. */
 uint64_t hapi_tick_hash_axes(const hapi_tick *tick, uint32_t pointer, uint64_t hash);
 /* Of what the tick has come to, likewise. */
 uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash);

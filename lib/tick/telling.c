@@ -287,6 +287,41 @@ static void buttons_follow(const listening *at)
   }
 }
 
+/* Of those that drive nothing the thresholds are those of hap_pointer_outputs_init. */
+static bool gripper_closes(const listening *at, const hapi_axis *axis, bool closed)
+{
+  const hap_pointer_outputs *set = &at->tick->outputs[at->index].wanted;
+  double bound = closed ? HAPI_GRIPPER_OPEN : HAPI_GRIPPER_CLOSED;
+  if (at->pointer->drives) {
+    bound = closed ? set->gripper_open : set->gripper_closed;
+  }
+  double share = (axis->at - axis->low) / (axis->high - axis->low);
+  return closed ? share < bound : share <= bound;
+}
+
+static void grippers_follow(const listening *at)
+{
+  const hapi_axes *axes = &at->tick->axes[at->index];
+  for (uint32_t i = 0; i < axes->count; ++i) {
+    const hapi_axis *axis = &axes->of[i];
+    bool closed = (at->list->closed >> i & 1u) != 0;
+    bool closes = axis->kind == HAP_AXIS_GRIPPER && gripper_closes(at, axis, closed);
+    if (closes == closed) {
+      continue;
+    }
+    at->list->closed ^= 1u << i;
+    if (at->ring != NULL) {
+      event_put(at->ring,
+                &(hap_event){.kind = HAP_EVENT_GRIPPER,
+                             .number = i,
+                             .time_ns = at->tick->facts.now_ns,
+                             .pointer.v = hapi_pointer_id_of(at->list->generation, at->index + 1),
+                             .speed = axis->rate,
+                             .is_down = closes});
+    }
+  }
+}
+
 static void fault_follow(hapi_telling *telling, const hapi_tick *tick, hapi_event_ring *ring)
 {
   const hapi_fault_latch *latch = &tick->guard.latch;
@@ -308,7 +343,7 @@ static void list_leave(const listening *at)
     felt_release(at, &at->list->of[i]);
   }
   at->list->count = 0;
-  at->list->buttons = 0;
+  at->list->buttons = at->list->closed = 0;
 }
 
 /* False for NaN and infinity, too, which the guard makes a fault of. */
@@ -358,6 +393,9 @@ void hapi_telling_follow(hapi_telling *telling, const hapi_tick *tick, bool even
     if (at.list->generation != 0) {
       list_follow(&at);
       buttons_follow(&at);
+      if (at.pointer->has_axes) {
+        grippers_follow(&at);
+      }
     }
   }
   fault_follow(telling, tick, ring);

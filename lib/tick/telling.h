@@ -41,6 +41,7 @@ typedef struct hapi_felt {
 typedef struct hapi_felt_list {
   uint32_t generation; /* of the pointer */
   uint32_t buttons;
+  uint32_t closed; /* grippers, a bit for each axis */
   uint32_t count;
   hapi_felt of[HAP_TOUCHES_MAX];
 } hapi_felt_list;

@@ -31,6 +31,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       {&tick->pointers.hulls, c->pointers, sizeof *tick->pointers.hulls, true},
       ARRAY(own, (size_t)HAP_FORCES_MAX * c->pointers),
       ARRAY(axes, c->pointers),
+      ARRAY(outputs, c->pointers),
       ARRAY(bodies.of, c->bodies),
       ARRAY(bodies.courses, c->bodies),
       ARRAY(bodies.live, c->bodies),
@@ -160,6 +161,12 @@ void hapi_tick_guard(hapi_tick *tick)
     hapi_energy_pass(tick->facts.period, &tick->pointers);
   }
   hapi_guard_write(&tick->guard, tick->facts.period, &tick->pointers);
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    if (p->drives && p->generation != 0) {
+      hapi_outputs_follow(&tick->outputs[i], &tick->guard, &tick->axes[i], p, tick->facts.period);
+    }
+  }
 }
 
 static void own_forces(hapi_tick *tick)

@@ -32,6 +32,7 @@
 #include "pointer/axes.h"
 #include "pointer/pointer.h"
 #include "sync/messages.h"
+#include "tick/outputs.h"
 #include "tick/own_forces.h"
 
 /* What the trace shows besides the pointers. */
@@ -45,8 +46,9 @@ typedef struct hapi_tick {
   hapi_capacity capacity;
   hapi_tick_facts facts;
   hapi_pointers pointers;
-  hapi_own_force *own; /* HAP_FORCES_MAX of each pointer */
-  hapi_axes *axes;     /* by pointer, of those that have some */
+  hapi_own_force *own;   /* HAP_FORCES_MAX of each pointer */
+  hapi_axes *axes;       /* by pointer, of those that have some */
+  hapi_outputs *outputs; /* by pointer, of those that drive some */
   hapi_bodies bodies;
   hapi_touches touches;
   hapi_body_contacts contacts;
@@ -67,7 +69,7 @@ typedef struct hapi_tick_array {
   bool stays;  /* hapi_tick_reset does not touch it */
 } hapi_tick_array;
 
-#define HAPI_TICK_ARRAYS 28
+#define HAPI_TICK_ARRAYS 29
 
 /* All of them; the capacity, and that of rows, buckets and work, are set. */
 void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS]);
