@@ -7,9 +7,11 @@
 
 #include <math.h>
 #include <string.h>
+#include <time.h>
 
 #include <hapode/device_impl.h>
 
+#include "tests/files.h"
 #include "tests/ode_world.h"
 
 #define STIFFNESS 1000.0
@@ -692,4 +694,99 @@ TEST(the_first_end_effector_is_the_only_one_of_others)
   CHECK(hap_pointer_add(s->session, &def, &s->pointer) == HAP_ERROR_ARGUMENT);
   def.effector = 0;
   CHECK(hap_pointer_add(s->session, &def, &s->pointer) == HAP_OK);
+}
+
+/* ---- recordings ---- */
+
+#define WAVE_HZ 5.0
+
+/* Fingers that go down into the floor and up again, each by another way. */
+static hap_status wave_read(void *self, int64_t time_ns, hap_device_input *const out[])
+{
+  glove *g = self;
+  double t = 1e-9 * (double)time_ns;
+  for (uint32_t i = 0; i < FINGERS; ++i) {
+    g->height[i] = RADIUS + 0.003 * cos(6.28 * WAVE_HZ * t + i);
+  }
+  return glove_read(self, time_ns, out);
+}
+
+static void wave_wait(void)
+{
+  const struct timespec wait = {.tv_nsec = 100000000};
+  (void)nanosleep(&wait, NULL);
+}
+
+/* Fingers leave, come, are started again with their device, and lose it: the replay, without the
+ * device, has all of it. */
+TEST(a_replay_has_all_fingers_of_a_device)
+{
+  static hap_device_ops ops; /* there until the stage has closed its device */
+  hap_detail why = {""};
+  hap_record_def file;
+  hap_player *player = NULL;
+  hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
+  hap_ode_def ode;
+  ops = glove_ops;
+  ops.read = wave_read;
+  ops.pacing = HAP_PACING_HOST;
+  REQUIRE(folder_make());
+  hap_record_def_init(&file, sizeof file);
+  file.path = folder_path("fingers.rec");
+  glove_stage *g = tap_own(sizeof *g, glove_stage_end);
+  ode_world_make(9.81, &g->s.world, &g->s.space);
+  dCreatePlane(g->s.space, 0.0, 0.0, 1.0, 0.0);
+  REQUIRE(hap_device_create(&ops, &g->glove, &g->s.device, NULL) == HAP_OK);
+  hap_session_def_init(&def, sizeof def);
+  hap_ode_def_init(&ode, sizeof ode);
+  def.rt_priority = 0;
+  ode.world = g->s.world;
+  ode.space = g->s.space;
+  g->s.session = session_make(&def, &ode);
+  REQUIRE_SAY(hap_session_record(g->s.session, &file, &why) == HAP_OK, "%s", why.text);
+  REQUIRE(finger_add(g, 2) == HAP_OK && finger_add(g, 0) == HAP_OK);
+  REQUIRE(hap_session_start(g->s.session) >= HAP_OK);
+  wave_wait();
+  REQUIRE(finger_add(g, 1) == HAP_OK);
+  wave_wait();
+  CHECK(hap_pointer_remove(g->s.session, g->fingers[2]) == HAP_OK);
+  wave_wait();
+  CHECK(finger_add(g, 2) == HAP_OK);
+  CHECK(hap_pointer_restart(g->s.session, g->fingers[1]) == HAP_OK);
+  wave_wait();
+  hap_emergency_zero();
+  wave_wait();
+  CHECK(hap_session_reset_fault(g->s.session) >= HAP_OK);
+  wave_wait();
+  hap_stats stats;
+  CHECK(hap_session_stop(g->s.session) == HAP_OK);
+  REQUIRE(hap_session_stats(g->s.session, &stats, sizeof stats) == HAP_OK);
+  CHECK(stats.loop.contact_ticks > 50 && stats.faults.count == 1);
+  tap_release(g);
+
+  own_stage *r = own_stage_new();
+  hap_expert_def_init(&expert, sizeof expert);
+  hap_research_def_init(&research, sizeof research);
+  REQUIRE(hap_player_open(file.path, HAP_PLAY_WHOLE, &player, &why) >= HAP_OK);
+  REQUIRE(hap_player_get_def(player, &def, &expert, &research) >= HAP_OK);
+  hap_ode_def_init(&ode, sizeof ode);
+  ode.world = r->world;
+  ode.space = r->space;
+  r->session = session_make(&def, &ode);
+  REQUIRE(hap_session_play(r->session, player, &why) >= HAP_OK);
+  session_run(r->session);
+  hap_status status = HAP_OK;
+  while (status == HAP_OK || status == HAP_FAULTED) {
+    status = hap_session_advance(r->session, 100);
+  }
+  (void)hap_session_detail(r->session, &why);
+  CHECK_SAY(status == HAP_END, "%s", why.text);
+  const uint64_t ticks = stats.loop.ticks;
+  REQUIRE(hap_session_stats(r->session, &stats, sizeof stats) == HAP_OK);
+  CHECK(stats.loop.ticks == ticks && stats.faults.count == 1);
+  hap_session_destroy(r->session);
+  r->session = NULL;
+  hap_player_close(player);
 }
