@@ -11,7 +11,7 @@
 #include <signal.h>
 #include <time.h>
 
-#define POINTS 34
+#define POINTS 38
 
 static pid_t check_start(const char *spec, const char *options)
 {
@@ -101,6 +101,16 @@ static const struct {
     {"limit_is_not_said", "write_keeps_the_limits"},
     {"nan_is_taken", "write_not_finite_gives_no_force"},
     {"nan_is_held", "write_not_finite_gives_no_force"},
+    {"axis_is_nan", "axes_are_within_their_ranges"},
+    {"axis_is_beyond", "axes_are_within_their_ranges"},
+    {"workspace_is_elsewhere", "poses_are_in_the_workspace"},
+    {"axis_gives_double", "axis_forces_are_reached"},
+    {"axis_gives_against", "axis_forces_are_reached"},
+    {"axis_is_not_zeroed", "axis_forces_are_reached"},
+    {"axis_reached_is_not_filled_in", "axis_forces_are_reached"},
+    {"axis_has_no_limit", "axes_keep_their_limits"},
+    {"axis_nan_is_held", "axes_keep_their_limits"},
+    {"vibrators_are_refused", "leds_and_vibrators_are_taken"},
     {"zero_does_nothing", "zero_takes_the_force_off"},
     {"zero_is_for_ever", "zero_takes_the_force_off"},
     {"zero_disturbs", "zero_in_another_thread"},
@@ -142,7 +152,7 @@ TEST(without_a_fault_every_point_holds)
 {
   int code = device_check(broken_check("none"), "");
   CHECK(code == 0 && lines_from(ran.out, "not ok") == 0 && lines_from(ran.out, "ok ") == POINTS);
-  CHECK(lines_from(ran.out, "1..34") == 1);
+  CHECK(lines_from(ran.out, "1..38") == 1);
   if (code != 0) {
     output_show();
   }
@@ -181,7 +191,7 @@ TEST(a_check_without_force_asks_for_none)
 TEST(a_device_in_real_time_gets_small_forces_alone)
 {
   CHECK(device_check(broken_check("refuses_much_force,pacing=host"), "") == 0);
-  CHECK(lines_from(ran.out, "not ok") == 0 && output_skips("# SKIP only with --check-limits") == 2);
+  CHECK(lines_from(ran.out, "not ok") == 0 && output_skips("# SKIP only with --check-limits") == 3);
   CHECK(output_skips("what this check must not ask for") == 0);
   CHECK(device_check(broken_check("refuses_much_force,pacing=host"), "--check-limits") == 1);
   CHECK(output_skips("what this check must not ask for") > 0);
@@ -220,8 +230,8 @@ TEST(a_device_is_followed_through_its_plug)
 {
   int code = device_check(broken_check("unplugged"), "--check-unplug 3");
   printf("# exit code %d\n", code);
-  CHECK(lines_from(ran.out, "ok 34 - unplugged") == 1 &&
-        lines_from(ran.out, "ok 34 - unplugged # SKIP") == 0);
+  CHECK(lines_from(ran.out, "ok 38 - unplugged") == 1 &&
+        lines_from(ran.out, "ok 38 - unplugged # SKIP") == 0);
   CHECK(device_check(broken_check("none"), "--check-unplug 3") == 1 && caught_by("unplugged"));
   CHECK(strstr(ran.out, "nobody unplugged it") != NULL);
 }

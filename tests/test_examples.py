@@ -26,6 +26,8 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "own_forces": "docs/forces.md",
     "sandpaper_and_ice": "docs/surfaces.md",
     "push_without_ode": "docs/scene.md",
+    "grip_and_feel": "docs/grippers.md",
+    "two_fingers": "docs/fingers.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -173,6 +175,24 @@ def check_push_without_ode(program):
           "the mallet is pushed on", str(rows))
     point(len(rows) == 5 and abs(float(rows[-2][1]) + 1.95) < 0.1, "the hand feels its friction",
           str(rows))
+
+
+def check_grip_and_feel(program):
+    out = run(program)
+    rows = rows_of(out, r"^([0-9.]+) s +([0-9.]+) mm, (-?[0-9.]+) N$")
+    point(len(rows) == 10 and float(rows[4][1]) > 30 and abs(float(rows[4][2]) - 2.4) < 0.1,
+          "where the springs of egg and fingers agree", out)
+    point(out.count("holds the egg") == 1 and out.count("lets it go") == 1,
+          "closing and opening are told once", out)
+
+
+def check_two_fingers(program):
+    rows = rows_of(run(program), r"^(-?[0-9.]+) and (-?[0-9.]+) N, cube at ([0-9.]+) m$")
+    point(len(rows) == 5 and float(rows[0][1]) == 0.0 and abs(float(rows[1][1]) - 4.5) < 0.1,
+          "the fingers close on the cube", str(rows))
+    point(len(rows) == 5 and all(abs(float(row[0]) + float(row[1])) < 0.02 for row in rows),
+          "they push against each other", str(rows))
+    point(len(rows) == 5 and 0.12 < float(rows[-1][2]) < 0.131, "and lift it", str(rows))
 
 
 def check_record_and_play(program):

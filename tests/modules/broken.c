@@ -22,6 +22,7 @@
 #define TORQUE_MAX 0.5
 #define SMALL_FORCE 1.0 /* N, that no check may go beyond without being told to */
 #define TURN 0.3        /* rad */
+#define AXIS_FORCE 2.0  /* N */
 #define RATE 12.0       /* rad/s */
 
 typedef struct broken {
@@ -33,6 +34,7 @@ typedef struct broken {
   int64_t first_ns;
   int64_t before_ns;
   hap_wrench held;
+  double held_axis;
   bool pushed; /* since it was opened */
   atomic_bool zeroed;
   atomic_bool disturbed;
@@ -141,6 +143,25 @@ static void broken_describe(void *self, uint32_t effector, hap_device_info *out)
   out->max_force = fault_is(d, "info_changes") && d->started ? 2.0 * FORCE_MAX : FORCE_MAX;
   out->max_torque = TORQUE_MAX;
   out->measures_velocity = fault_is(d, "measures_twice") ? 2 : 1;
+  out->axis_count = 1;
+  out->led_count = 2;
+  out->vibrator_count = 1;
+  for (int i = 0; i < 3; ++i) {
+    double shift = fault_is(d, "workspace_is_elsewhere") ? 0.1 : 0.0;
+    out->workspace_low[i] = shift - 0.05;
+    out->workspace_high[i] = shift + 0.05;
+  }
+}
+
+static void broken_describe_axis(void *self, uint32_t effector, uint32_t axis, hap_axis_info *out)
+{
+  (void)self;
+  (void)effector;
+  (void)axis;
+  out->kind = HAP_AXIS_GRIPPER;
+  out->unit = HAP_AXIS_METRES;
+  out->high = 0.05;
+  out->max_force = AXIS_FORCE;
 }
 
 static hap_status broken_start(void *self)
@@ -249,6 +270,10 @@ static hap_status broken_read(void *self, int64_t time_ns, hap_device_input *con
   if (!fault_is(d, "buttons_are_not_filled_in")) {
     in->buttons = 0;
   }
+  in->axes[0] = fault_is(d, "axis_is_nan")      ? (double)NAN
+                : fault_is(d, "axis_is_beyond") ? 0.06
+                                                : 0.02;
+  in->axis_rates[0] = 0.0;
   return status;
 }
 
@@ -304,6 +329,21 @@ static hap_status check_write(broken *d, const hap_wrench *wanted)
   return finite || fault_is(d, "nan_is_taken") ? HAP_OK : HAP_ERROR_ARGUMENT;
 }
 
+/* The force of the axis; true: it was shortened. */
+static bool axis_give(broken *d, double wanted, double *reached)
+{
+  double most = fault_is(d, "axis_has_no_limit") ? 1e9 : AXIS_FORCE;
+  double factor = fault_is(d, "axis_gives_double")    ? 2.0
+                  : fault_is(d, "axis_gives_against") ? -1.0
+                                                      : 1.0;
+  double given = fmin(fmax(factor * wanted, -most), most);
+  d->held_axis = given;
+  if (!fault_is(d, "axis_reached_is_not_filled_in")) {
+    *reached = given;
+  }
+  return fabs(wanted) > AXIS_FORCE;
+}
+
 static hap_status broken_write(void *self, const hap_device_output *const wanted[],
                                hap_device_output *const reached[])
 {
@@ -311,6 +351,14 @@ static hap_status broken_write(void *self, const hap_device_output *const wanted
   hap_status status = check_write(d, &wanted[0]->wrench);
   if (status < HAP_OK) {
     return status;
+  }
+  if (!(fabs(wanted[0]->axis_forces[0]) <= 1e300)) {
+    d->held_axis = fault_is(d, "axis_nan_is_held") ? 1.0 : 0.0;
+    atomic_store(&d->zeroed, !fault_is(d, "axis_nan_is_held"));
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (fault_is(d, "vibrators_are_refused") && wanted[0]->vibrators[0].amplitude > 0.0) {
+    return HAP_ERROR_DEVICE;
   }
   hap_wrench given = wanted[0]->wrench;
   double factor = fault_is(d, "gives_double") ? 2.0 : fault_is(d, "gives_against") ? -1.0 : 1.0;
@@ -320,6 +368,7 @@ static hap_status broken_write(void *self, const hap_device_output *const wanted
   }
   bool saturated = vector_shorten(d, given.force, FORCE_MAX);
   saturated = vector_shorten(d, given.torque, TORQUE_MAX) || saturated;
+  bool axis_saturated = axis_give(d, wanted[0]->axis_forces[0], &reached[0]->axis_forces[0]);
   d->pushed = d->pushed || vector_norm(given.force) > 0.0;
   if (!fault_is(d, "reached_is_not_filled_in")) {
     reached[0]->wrench = given;
@@ -336,7 +385,8 @@ static hap_status broken_write(void *self, const hap_device_output *const wanted
   if (fault_is(d, "odd_write_status")) {
     return (hap_status)42;
   }
-  return saturated && !fault_is(d, "limit_is_not_said") ? HAP_SATURATED : HAP_OK;
+  saturated = saturated && !fault_is(d, "limit_is_not_said");
+  return saturated || axis_saturated ? HAP_SATURATED : HAP_OK;
 }
 
 static void broken_zero(void *self)
@@ -388,6 +438,8 @@ static void broken_close(void *self)
 static void broken_held(void *self, hap_device_output *const out[])
 {
   const broken *d = self;
+  bool off = atomic_load(&d->zeroed) && !fault_is(d, "axis_is_not_zeroed");
+  out[0]->axis_forces[0] = off ? 0.0 : d->held_axis;
   memset(&out[0]->wrench, 0, sizeof out[0]->wrench);
   if (fault_is(d, "shared")) {
     out[0]->wrench = shared;
@@ -410,6 +462,7 @@ static hap_device_ops ops = {
     .stop = broken_stop,
     .close = broken_close,
     .held = broken_held,
+    .describe_axis = broken_describe_axis,
 };
 
 const hap_device_ops *hapode_device_module(uint32_t host_abi)

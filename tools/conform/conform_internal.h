@@ -47,6 +47,7 @@ typedef struct conform_said {
   bool holds_at_start;
   bool jumps;
   bool reached_wrong;
+  bool axis_wrong;
   bool zero_wrong;
   bool start_wrong;
   bool reads_unstarted;
@@ -173,6 +174,11 @@ void conform_read_time(conform *c);
 void conform_steps(conform *c);
 void conform_twist_fits(conform *c);
 void conform_after_pause(conform *c);
+
+void conform_workspace(conform *c);
+void conform_axis_forces(conform *c);
+void conform_axis_limits(conform *c);
+void conform_lights(conform *c);
 
 void conform_reached(conform *c);
 void conform_held_is_reached(conform *c);
