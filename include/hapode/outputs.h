@@ -3,8 +3,8 @@
 #ifndef HAPODE_OUTPUTS_H
 #define HAPODE_OUTPUTS_H
 
-/* What a device does beside the wrench on the hand: forces on its axes, such as a gripper, vibrators
- * and LEDs (docs/grippers.md). */
+/* What a device does beside the wrench on the hand: forces on its axes, such as a gripper,
+ * vibrators and LEDs (docs/grippers.md). */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -22,7 +22,7 @@ HAP_BEGIN_DECLS
  * the unit of the axis and of its force (hap_axis_info); positive ones open a gripper. Of force,
  * stiffness and damping 0 (default) is none. Final. */
 typedef struct hap_axis_push {
-  double force;
+  double force;     /* within 1e9 */
   double stiffness; /* 0..1e9 */
   double target;    /* within the range of the axis where there is a stiffness */
   double damping;   /* 0..1e6 */
@@ -51,8 +51,8 @@ typedef struct hap_pointer_outputs {
  * build. */
 HAP_API void hap_pointer_outputs_init(hap_pointer_outputs *outputs, size_t size_of_outputs);
 
-/* [any] Sets all of them, before start or at the next tick; wait-free for the loop. Of several calls
- * between two ticks the last one acts. They stay until they are set again, also over
+/* [any] Sets all of them, before start or at the next tick; wait-free for the loop. Of several
+ * calls between two ticks the last one acts. They stay until they are set again, also over
  * hap_session_stop and hap_pointer_restart.
  *
  * A force on an axis goes to the new one in 20 ms, and never faster than 2 ms from none to the

@@ -187,12 +187,11 @@ static hap_status check_axis(const hap_device_ops *ops, uint32_t index, const ha
   if (hapi_device_axis_good(axis)) {
     return HAP_OK;
   }
-  return hapi_fail(detail, HAP_ERROR_DEVICE, "device '%s', axis %u: %s", ops->name, index,
-                   !axis_is_known(axis)
-                       ? "an unknown kind or unit; is the library older than the device?"
-                   : axis_has_range(axis)
-                       ? "max_force is neither 0 nor from 1e-15 to 1e9"
-                       : "low and high are not finite, beyond 1e6, or not in this order");
+  return hapi_fail(
+      detail, HAP_ERROR_DEVICE, "device '%s', axis %u: %s", ops->name, index,
+      !axis_is_known(axis)   ? "an unknown kind or unit; is the library older than the device?"
+      : axis_has_range(axis) ? "max_force is neither 0 nor from 1e-15 to 1e9"
+                             : "low and high are not finite, beyond 1e6, or not in this order");
 }
 
 static void info_read(const hap_device *device, uint32_t effector, hap_device_info *out)

@@ -7,6 +7,10 @@
 
 #include "haptic/haptic_internal.h"
 
+/* Within the ranges of hapode/outputs.h, whatever the device is. */
+bool hapi_outputs_push_is_sound(const hap_axis_push *push);
+bool hapi_outputs_vibration_is_sound(const hap_vibration *vibration);
+
 void hapi_outputs_prepare(hapi_pointer_slot *slot);          /* for a new user of the slot */
 void hapi_outputs_join(hapi_haptic *haptic, uint32_t index); /* a pointer comes in */
 void hapi_outputs_take(hapi_haptic *haptic, uint32_t index); /* [haptic] what was set since */

@@ -38,9 +38,9 @@ typedef struct hapi_motion_text {
   int numbers; /* of a waypoint: 3, or 1 for motions along a line */
 } hapi_motion_text;
 
-/* Parses "T:x/y/z;T:x/y/z", or "T:x;T:x", into new waypoints, which hapi_motion_finish frees. HAP_ERROR_ARGUMENT
- * with the number of the bad waypoint, and for a path that jumps where it shall begin again
- * (motion->loop). A motion that failed may be finished. */
+/* Parses "T:x/y/z;T:x/y/z", or "T:x;T:x", into new waypoints, which hapi_motion_finish frees.
+ * HAP_ERROR_ARGUMENT with the number of the bad waypoint, and for a path that jumps where it shall
+ * begin again (motion->loop). A motion that failed may be finished. */
 HAP_NODISCARD hap_status hapi_motion_set_path(hapi_motion *motion, const hapi_motion_text *text,
                                               hap_detail *detail);
 void hapi_motion_finish(hapi_motion *motion);
