@@ -322,6 +322,27 @@ static hap_wrench declared_felt(const hapi_pointer *p)
   return felt;
 }
 
+/* Without the axes, which stay 0 where there are none. */
+static void state_tell(const hapi_pointer *p, int64_t now_ns, hap_pointer_state *out)
+{
+  double scale = p->device.motion_scale * p->device.force_scale;
+  hap_coupling spring = p->rigid ? p->coupling.kind : HAP_COUPLING_PROXY;
+  out->contacts = p->contacts;
+  out->stamp_ns = now_ns;
+  out->device = p->device.good;
+  out->proxy = p->pose;
+  out->twist = p->twist;
+  out->wrench = p->wrench;
+  out->buttons = p->device.buttons;
+  out->coupling = p->proxied ? (uint32_t)spring : HAP_COUPLING_DIRECT;
+  out->coupling_reason = (uint32_t)p->coupling.reason;
+  out->guard = p->guard.flags;
+  out->coupling_stiffness = p->proxied ? scale * p->coupling.stiffness : 0.0;
+  out->coupling_damping = p->proxied ? scale * p->coupling.damping : 0.0;
+  out->contact_stiffness = scale * p->coupling.contact_stiffness;
+  out->own = p->declared.any ? declared_felt(p) : (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+}
+
 static void axes_tell(const hapi_tick *tick, uint32_t index, hap_pointer_state *out)
 {
   const hapi_axes *axes = &tick->axes[index];
@@ -341,26 +362,8 @@ void hapi_pointers_publish(hapi_haptic *haptic)
     if (p->generation == 0) {
       continue;
     }
-    double scale = p->device.motion_scale * p->device.force_scale;
-    hap_coupling spring = p->rigid ? p->coupling.kind : HAP_COUPLING_PROXY;
     hap_pointer_state *state = &slot->states[hapi_triple_back(&slot->state_buffer)];
-    *state = (hap_pointer_state){
-        .size = sizeof(hap_pointer_state),
-        .contacts = p->contacts,
-        .stamp_ns = haptic->tick.facts.now_ns,
-        .device = p->device.good,
-        .proxy = p->pose,
-        .twist = p->twist,
-        .wrench = p->wrench,
-        .buttons = p->device.buttons,
-        .coupling = p->proxied ? (uint32_t)spring : HAP_COUPLING_DIRECT,
-        .coupling_reason = (uint32_t)p->coupling.reason,
-        .guard = p->guard.flags,
-        .coupling_stiffness = p->proxied ? scale * p->coupling.stiffness : 0.0,
-        .coupling_damping = p->proxied ? scale * p->coupling.damping : 0.0,
-        .contact_stiffness = scale * p->coupling.contact_stiffness,
-        .own = p->declared.any ? declared_felt(p) : (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}},
-    };
+    state_tell(p, haptic->tick.facts.now_ns, state);
     if (p->has_axes) {
       axes_tell(&haptic->tick, i, state);
     }

@@ -372,7 +372,7 @@ uint64_t hapi_tick_hash(const hapi_tick *tick, uint64_t hash)
       hash = hapi_hash_doubles(hash, p->pose.position, 3);
       hash = hapi_hash_doubles(hash, p->device.wrench.force, 3);
       hash = hapi_hash_doubles(hash, p->device.wrench.torque, 3);
-      hash = hapi_tick_hash_axes(tick, i, hash);
+      hash = p->has_axes || p->drives ? hapi_tick_hash_axes(tick, i, hash) : hash;
     }
   }
   for (uint32_t i = 0; i < tick->bodies.live_count; ++i) {

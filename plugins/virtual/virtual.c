@@ -573,12 +573,20 @@ static void place_hand(virtual_device *device, uint64_t at_ns)
   }
 }
 
-static void gripper_move(virtual_device *device, uint64_t before_ns)
+static void gripper_read(virtual_device *device, bool first, uint64_t before_ns,
+                         hap_device_input *out)
 {
-  uint64_t now_ns = device->timeline.elapsed_ns;
-  double force = hapi_output_is_zeroed(&device->output) ? 0.0 : device->gripper.held;
-  hapi_gripper_move(&device->gripper, device->start + hapi_timeline_seconds(before_ns),
-                    hapi_timeline_seconds(now_ns - before_ns), force);
+  hapi_gripper *gripper = &device->gripper;
+  uint64_t way_ns = device->timeline.elapsed_ns - before_ns;
+  double force = hapi_output_is_zeroed(&device->output) ? 0.0 : gripper->held;
+  if (first) {
+    hapi_gripper_place(gripper, device->start, device->held);
+  } else {
+    hapi_gripper_move(gripper, device->start + hapi_timeline_seconds(before_ns),
+                      hapi_timeline_seconds(way_ns), force);
+  }
+  out->axes[0] = gripper->fingers.position[0];
+  out->axis_rates[0] = gripper->fingers.velocity[0];
 }
 
 static void kick_hand(virtual_device *device, uint64_t now_ns)
@@ -675,13 +683,12 @@ static hap_status virtual_read(void *self, int64_t time_ns, hap_device_input *co
   }
   if (first) {
     place_hand(device, 0);
-    hapi_gripper_place(&device->gripper, device->start, device->held);
   } else {
     device_move(device, before_ns);
-    gripper_move(device, before_ns);
   }
-  in->axes[0] = device->gripper.fingers.position[0];
-  in->axis_rates[0] = device->gripper.fingers.velocity[0];
+  if (device->gripper.there) {
+    gripper_read(device, first, before_ns, in);
+  }
   pose_measure(device, first, device->timeline.elapsed_ns - before_ns);
   in->twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hapi_v3_copy(device->measured.position, in->pose.position);
@@ -695,18 +702,21 @@ static hap_status virtual_write(void *self, const hap_device_output *const wante
                                 hap_device_output *const reached[])
 {
   virtual_device *device = self;
-  double push = wanted[0]->axis_forces[0];
-  double most = device->gripper.max_force;
+  hapi_gripper *gripper = &device->gripper;
+  bool shortened = false;
   if (!device->timeline.running) {
     return HAP_ERROR_STATE;
   }
-  if (device->gripper.there && !hapi_finite(&push, 1)) {
-    return HAP_ERROR_ARGUMENT;
+  if (gripper->there) {
+    double push = wanted[0]->axis_forces[0];
+    if (!hapi_finite(&push, 1)) {
+      return HAP_ERROR_ARGUMENT;
+    }
+    gripper->held = hapi_max(hapi_min(push, gripper->max_force), -gripper->max_force);
+    reached[0]->axis_forces[0] = gripper->held;
+    shortened = gripper->held != push;
   }
-  device->gripper.held = device->gripper.there ? hapi_max(hapi_min(push, most), -most) : 0.0;
-  reached[0]->axis_forces[0] = device->gripper.held;
   hap_status status = hapi_output_write(&device->output, &wanted[0]->wrench, &reached[0]->wrench);
-  bool shortened = device->gripper.there && device->gripper.held != push;
   return status == HAP_OK && shortened ? HAP_SATURATED : status;
 }
 
