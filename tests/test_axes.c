@@ -556,6 +556,40 @@ TEST(fingers_yield_to_a_spring)
   CHECK_NEAR(state.axis_forces[0], -50.0 * state.axes[0], 1e-3);
 }
 
+/* Springs that no sampled loop can hold on so light a gripper, which nobody holds: it rattles, and
+ * gets no more energy than is promised. Besides, the guard knows the way of the last tick alone: in
+ * a tick the gripper of m may go on by F T^2 / m more. And of a
+ * debt up to the largest force on 0.1 mm so much is forgiven in 0.1 s. */
+TEST(a_spring_that_is_too_stiff_gives_what_it_promises_at_most)
+{
+  static const double stiffness[] = {1e3, 1e5, 1e9};
+  const double tick = 8.0 * 8.0 * 1e-6 / 0.05; /* J */
+  const double debt = 8.0 * 1e-4;
+  for (int k = 0; k < 3; ++k) {
+    bench *b = bench_new("virtual:hand=none,device_mass=0.1,gripper=0:0.06");
+    hap_pointer_outputs outputs = outputs_none();
+    outputs.axes[0].stiffness = stiffness[k];
+    outputs.axes[0].target = 0.04;
+    outputs.axes[0].max_force = 8.0;
+    outputs.axes[0].max_power = 0.05;
+    outputs_set(b, &outputs);
+    bench_run(b, 1);
+    double work = 0.0;
+    double most = 0.0;
+    hap_pointer_state before = hand_state(b);
+    for (int i = 1; i <= 5000; ++i) {
+      bench_run(b, 1);
+      hap_pointer_state now = hand_state(b);
+      work += before.axis_forces[0] * (now.axes[0] - before.axes[0]);
+      before = now;
+      most = fmax(most, work - 0.05 * (1e-3 * i + 0.1) - debt * (1.0 + 1e-2 * i) - tick);
+    }
+    CHECK_SAY(most <= 0.0, "%g N/m: %g J more than promised", stiffness[k], most);
+    CHECK(bench_fault(b) == HAP_FAULT_NONE);
+    tap_release(b);
+  }
+}
+
 typedef struct wrong_outputs {
   void (*spoil)(hap_pointer_outputs *io);
   const char *names; /* in the detail */
