@@ -541,8 +541,8 @@ TEST(an_axis_keeps_its_promise_of_power)
   }
 }
 
-/* 5 N at two ranges a second are 0.8 W, and in 0.1 s 80 mJ: of the 250 mJ of a gripper that opens by
- * 50 mm in 100 ms it gets 160. */
+/* 5 N at two ranges a second are 0.8 W, and in 0.1 s 80 mJ: of 250 mJ a gripper that opens by 50 mm
+ * in 100 ms gets 160. */
 TEST(without_a_promise_the_power_is_that_of_two_ranges_a_second)
 {
   bench *b = bench_new(NULL);

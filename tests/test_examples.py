@@ -195,6 +195,24 @@ def check_two_fingers(program):
     point(len(rows) == 5 and 0.12 < float(rows[-1][2]) < 0.131, "and lift it", str(rows))
 
 
+def check_lift_door(program):
+    out = run(program)
+    rows = rows_of(out, r"^([0-9.]+) s  edge at ([0-9.]+) m, hand feels (-?[0-9.]+) N$")
+    point(out.count("stopped by a hand") == 1, "a hand stops the door once", out)
+    point(len(rows) == 6 and float(rows[1][2]) > 3 and float(rows[-1][2]) == 0.0,
+          "the hand feels the door, and then no more", out)
+    point(len(rows) == 6 and 0.19 < float(rows[-1][1]) < 0.21, "the door is open again", out)
+
+
+def check_two_hands_with_clutch(program):
+    out = run(program)
+    rows = rows_of(out, r"^devices at (\d+) mm, hands at (\d+) and (\d+) mm, box at (\d+) mm$")
+    point(len(rows) == 8 and all(row[1] == row[2] for row in rows), "both hands go together", out)
+    stands = all(abs(int(held[3]) - int(free[3])) <= 1 for free, held in zip(rows[::2], rows[1::2]))
+    point(len(rows) == 8 and stands, "with the clutch held the box stands", out)
+    point(len(rows) == 8 and int(rows[-1][3]) > 165, "the box goes farther than the devices", out)
+
+
 def check_record_and_play(program):
     out = run(program, "push.rec")
     point(out == "the replay is the recording\n", "the replay is the recording", out)
@@ -259,6 +277,9 @@ def main(programs):
               "tests/test_examples.py ROOT --update writes it")
     point(len(example_of("touch_a_cube").splitlines()) <= 45, "the README's example is short")
     point("examples/frame_loop.c" in read("README.md"), "the README speaks of the frame loop")
+    point("examples/lift_door.c" in read("docs/platforms.md"), "platforms speak of the lift door")
+    point("examples/two_hands_with_clutch.c" in read("docs/pointers.md"),
+          "pointers speak of two hands with a clutch")
     for program in programs:
         globals()[f"check_{program.stem}"](program)
     print(f"1..{len(points)}")
