@@ -200,7 +200,6 @@ typedef struct stage {
   emulator emulator;
   hapi_spidar_port port;
   double now;
-  bool jammed; /* the port takes nothing */
 } stage;
 
 static int stage_send(void *self, const uint8_t *bytes, int count)
@@ -208,9 +207,6 @@ static int stage_send(void *self, const uint8_t *bytes, int count)
   stage *s = self;
   if (!s->emulator.plugged) {
     return -EIO;
-  }
-  if (s->jammed) {
-    return -EAGAIN;
   }
   emulator_write(&s->emulator, bytes, count, s->now);
   return 0;
@@ -572,30 +568,6 @@ TEST(a_pulled_cable_is_noticed_by_the_next_tick)
     s->now += CYCLE_S;
     CHECK(hapi_spidar_line_receive(&line) == -EIO);
     CHECK(hapi_spidar_line_send(&line, taut) == -EIO);
-  }
-}
-
-/* A port that takes only a part of the bytes is as one that takes none. */
-TEST(a_command_that_was_cut_is_ended_by_zeros)
-{
-  const emulator_def def = x4r_of(EMULATOR_HAND_HOLD);
-  hapi_spidar_line line;
-  uint8_t bytes[HAPI_SPIDAR_COMMANDS_MAX];
-  stage *s = stage_begin(&def, &line);
-  (void)stage_tick(s, &line, taut);
-  for (int part = 1; part < 74; ++part) {
-    REQUIRE(stage_tick(s, &line, taut));
-    s->now += CYCLE_S;
-    (void)hapi_spidar_line_receive(&line);
-    (void)hapi_spidar_cycle_commands(&line.cycle, taut, bytes);
-    emulator_write(&s->emulator, bytes, part, s->now);
-    s->jammed = true;
-    CHECK(hapi_spidar_line_send(&line, taut) == 0 && line.cut);
-    s->jammed = false;
-    (void)stage_tick(s, &line, taut);
-    s->now += CYCLE_S; /* what came in between is over */
-    (void)stage_tick(s, &line, taut);
-    CHECK(stage_tick(s, &line, taut) && is_right(s, &line) && !line.cut);
   }
 }
 

@@ -13,6 +13,9 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/serial.h>
+#include <poll.h>
+#include <pthread.h>
+#include <sched.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <sys/file.h>
@@ -62,6 +65,15 @@ static void fail_at(call which, int good, int times, int error)
 {
   fails[which] = (struct failing){good, times, error};
 }
+
+/* A port that takes some of the bytes, by chance. seed 0: all. */
+static struct {
+  _Atomic uint32_t seed;
+  int fd;
+} shares;
+
+/* Behind the next write, once: what a signal handler does then. */
+static void (*write_hook)(void);
 
 static void *real_symbol(const char *name)
 {
@@ -128,10 +140,26 @@ ssize_t write(int fd, const void *bytes, size_t size)
 {
   ssize_t (*real)(int, const void *, size_t);
   REAL(real, "write");
-  if (!call_fails(CALL_WRITE)) {
-    return real(fd, bytes, size);
+  if (shares.seed != 0 && fd == shares.fd) {
+    uint32_t dice = atomic_fetch_add(&shares.seed, 1) * 2654435761u;
+    size = (dice >> 8) % (size + 1);
+    if (size == 0) {
+      errno = EAGAIN;
+      return -1;
+    }
   }
-  return errno == 0 ? real(fd, bytes, size / 2) : -1;
+  ssize_t sent;
+  if (!call_fails(CALL_WRITE)) {
+    sent = real(fd, bytes, size);
+  } else {
+    sent = errno == 0 ? real(fd, bytes, size / 2) : -1;
+  }
+  void (*hook)(void) = write_hook;
+  write_hook = NULL;
+  if (hook != NULL) {
+    hook();
+  }
+  return sent;
 }
 
 /* NOLINTEND(readability-inconsistent-declaration-parameter-name) */
@@ -384,19 +412,169 @@ TEST(a_write_is_whole_or_is_tried_again)
 {
   rig *r = rig_open();
   const uint8_t bytes[8] = {1, 2, 3, 4, 5, 6, 7, 8};
-  uint8_t come[64];
+  uint8_t come[256];
   hapi_spidar_port port;
   hapi_spidar_serial_port(&r->serial, &port);
   CHECK(port.send(&r->serial, bytes, 8) == 0);
-  fail_at(CALL_WRITE, 0, 1, 0);
-  CHECK(port.send(&r->serial, bytes, 8) == -EAGAIN);
+  /* Who had the port before may have left a command in part. */
+  CHECK(read(r->board, come, sizeof come) == HAPI_SPIDAR_FRAME_MAX + 8);
+  CHECK(port.send(&r->serial, bytes, 8) == 0);
   fail_at(CALL_WRITE, 0, 1, EINTR);
   CHECK(port.send(&r->serial, bytes, 8) == -EAGAIN);
   fail_at(CALL_WRITE, 0, 1, EAGAIN);
   CHECK(port.send(&r->serial, bytes, 8) == -EAGAIN);
   fail_at(CALL_WRITE, 0, 1, EIO);
   CHECK(port.send(&r->serial, bytes, 8) == -EIO);
-  CHECK(read(r->board, come, sizeof come) == 12); /* one whole, and half of one */
+  CHECK(read(r->board, come, sizeof come) == 8);
+  fail_at(CALL_WRITE, 0, 1, 0);
+  CHECK(port.send(&r->serial, bytes, 8) == 0); /* half of it, and the rest is kept */
+  CHECK(read(r->board, come, sizeof come) == 4);
+  fail_at(CALL_WRITE, 0, 1, EAGAIN);
+  CHECK(port.send(&r->serial, bytes, 8) == -EAGAIN); /* the rest first, and that does not go */
+  CHECK(port.send(&r->serial, bytes, 8) == 0);
+  CHECK(read(r->board, come, sizeof come) == 12 && memcmp(come + 4, bytes, 8) == 0);
+}
+
+/* ---- commands on the line ---- */
+
+#define PULL_LOW 0xf1 /* a current of -15 */
+#define PULL_HIGH 0xff
+#define PULL_SIZE 37
+#define NONE_SIZE (16 + PULL_SIZE)
+
+/* CURRENT to board 0, a B3M, and the padding behind it. */
+static const uint8_t pull_bytes[PULL_SIZE] = {0x30,     PULL_LOW,  PULL_HIGH, PULL_LOW, PULL_HIGH,
+                                              PULL_LOW, PULL_HIGH, PULL_LOW,  PULL_HIGH};
+static const uint8_t none_bytes[NONE_SIZE] = {[16] = 0x30}; /* behind zeros */
+
+/* What a board hears: bytes to commands. */
+typedef struct heard {
+  uint8_t bytes[9];
+  int have;
+  unsigned pulls;
+  unsigned nones;
+  unsigned torn; /* a pull whose end is zeros */
+  unsigned wild;
+} heard;
+
+static void board_hear(heard *h, const uint8_t *bytes, ssize_t count)
+{
+  for (ssize_t i = 0; i < count; ++i) {
+    if (h->have == 0 && bytes[i] == 0) {
+      continue;
+    }
+    h->bytes[h->have++] = bytes[i];
+    if (h->have < 9) {
+      continue;
+    }
+    int same = 0;
+    int zeros = 0;
+    for (; same < 9 && h->bytes[same] == pull_bytes[same]; ++same) {
+    }
+    for (; zeros < 9 && h->bytes[8 - zeros] == 0; ++zeros) {
+    }
+    h->pulls += same == 9;
+    h->nones += zeros == 8 && same >= 1;
+    h->torn += zeros < 8 && same < 9 && same + zeros == 9;
+    h->wild += same + zeros < 9;
+    h->have = 0;
+  }
+}
+
+static void board_listen(const rig *r, heard *h)
+{
+  uint8_t bytes[4096];
+  struct pollfd some = {r->board, POLLIN, 0};
+  while (poll(&some, 1, 0) > 0) {
+    ssize_t count = read(r->board, bytes, sizeof bytes);
+    REQUIRE(count > 0);
+    board_hear(h, bytes, count);
+  }
+}
+
+static rig *interrupted;
+
+static void zero_from_handler(void)
+{
+  CHECK(hapi_spidar_serial_force(&interrupted->serial, none_bytes, NONE_SIZE));
+}
+
+static void half_zero_from_handler(void)
+{
+  fail_at(CALL_WRITE, 0, 100000, 0); /* never whole */
+  CHECK(!hapi_spidar_serial_force(&interrupted->serial, none_bytes, NONE_SIZE));
+  memset(fails, 0, sizeof fails);
+}
+
+/* A header must never be taken for a current, whoever writes when. */
+TEST(a_zero_in_the_middle_of_a_write_leaves_no_wild_command)
+{
+  for (int cut = 0; cut < 2; ++cut) {
+    for (int half = 0; half < 2; ++half) {
+      rig *r = rig_open();
+      heard h = {.have = 0};
+      hapi_spidar_port port;
+      hapi_spidar_serial_port(&r->serial, &port);
+      CHECK(port.send(&r->serial, pull_bytes, PULL_SIZE) == 0);
+      interrupted = r;
+      if (cut != 0) {
+        fail_at(CALL_WRITE, 0, 1, 0);
+      }
+      write_hook = half != 0 ? half_zero_from_handler : zero_from_handler;
+      (void)port.send(&r->serial, pull_bytes, 12); /* half of it is in the currents */
+      CHECK(port.send(&r->serial, pull_bytes, PULL_SIZE) == 0);
+      board_listen(r, &h);
+      CHECK(h.wild == 0 && h.pulls + h.torn == 3 && h.have == 0);
+      CHECK(h.nones >= 1);
+      CHECK(h.torn <= (cut != 0 ? 1 : 0));
+    }
+  }
+}
+
+static atomic_bool pull_end;
+
+static void *pull_often(void *self)
+{
+  rig *r = self;
+  hapi_spidar_port port;
+  hapi_spidar_serial_port(&r->serial, &port);
+  while (!atomic_load(&pull_end)) {
+    (void)port.send(&r->serial, pull_bytes, PULL_SIZE);
+    sched_yield();
+  }
+  return NULL;
+}
+
+/* Two threads, and a port that takes what it likes. */
+TEST(commands_are_whole_whatever_the_port_takes)
+{
+  rig *r = rig_open();
+  heard h = {.have = 0};
+  pthread_t thread;
+  shares.fd = r->serial.fd;
+  shares.seed = 1;
+  atomic_store(&pull_end, false);
+  REQUIRE(pthread_create(&thread, NULL, pull_often, r) == 0);
+  for (int i = 0; i < 1000000 && (h.pulls < 1000 || h.nones < 1000); ++i) {
+    (void)hapi_spidar_serial_force(&r->serial, none_bytes, NONE_SIZE);
+    sched_yield();
+    board_listen(r, &h);
+  }
+  atomic_store(&pull_end, true);
+  pthread_join(thread, NULL);
+  shares.seed = 0;
+  bool whole = false;
+  for (int i = 0; i < 10000 && !whole; ++i) { /* a busy kernel may be behind */
+    whole = hapi_spidar_serial_force(&r->serial, none_bytes, NONE_SIZE);
+    board_listen(r, &h);
+  }
+  CHECK(whole);
+  /* One for the port that was opened. A thread that is away for ms in the driver was not waited
+   * for. */
+  unsigned beside = atomic_load(&r->serial.cuts) - 1;
+  CHECK_SAY(h.wild <= beside && h.torn <= beside && h.pulls >= 1000 && h.nones >= 1000,
+            "%u wild, %u torn, %u pulls, %u nones, %u not waited for", h.wild, h.torn, h.pulls,
+            h.nones, beside);
 }
 
 TEST(nothing_to_read_is_no_error_and_a_hang_up_is)

@@ -176,20 +176,11 @@ hap_status hapi_spidar_line_begin(hapi_spidar_line *line, const hapi_spidar_port
   return HAP_OK;
 }
 
-/* A command that went out in part is ended by zeros, whatever it was. */
-static int send_once(hapi_spidar_line *line, const int16_t *currents)
-{
-  uint8_t bytes[HAPI_SPIDAR_FRAME_MAX + HAPI_SPIDAR_COMMANDS_MAX];
-  int zeros = line->cut ? HAPI_SPIDAR_FRAME_MAX : 0;
-  memset(bytes, 0, (size_t)zeros);
-  int count = zeros + hapi_spidar_cycle_commands(&line->cycle, currents, bytes + zeros);
-  return line->port.send(line->port.self, bytes, count);
-}
-
 int hapi_spidar_line_send(hapi_spidar_line *line, const int16_t *currents)
 {
-  int sent = send_once(line, currents);
-  line->cut = sent == -EAGAIN;
+  uint8_t bytes[HAPI_SPIDAR_COMMANDS_MAX];
+  int count = hapi_spidar_cycle_commands(&line->cycle, currents, bytes);
+  int sent = line->port.send(line->port.self, bytes, count);
   if (line->waiting < 0.0) {
     line->waiting = line->port.now(line->port.self);
   }

@@ -30,7 +30,6 @@ typedef struct hapi_spidar_line {
   double step_rate;   /* counts/s that a string may do; a faster one is a wrong reply */
   double taken;       /* s, of the newest good reply */
   double waiting;     /* s, of the oldest command without an answer; < 0: there is none */
-  bool cut;           /* a command was sent in part: the next one needs zeros before it */
   uint32_t bad_steps; /* replies in a row that jumped */
 } hapi_spidar_line;
 

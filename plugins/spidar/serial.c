@@ -7,19 +7,27 @@
 #include <limits.h>
 #include <linux/serial.h>
 #include <poll.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <termios.h>
+#include <time.h>
 #include <unistd.h>
 
+#include "base/assert.h"
 #include "base/clock.h"
 #include "base/log.h"
 
 #define LOCK_TRIES 50 /* of 10 ms */
 #define FORCE_TRIES 200
+#define WRITER_LOOKS 20000 /* some 20 us */
+#define WRITER_PAUSES 16
+#define WRITER_PAUSE_NS 100000
+
+_Static_assert(ATOMIC_POINTER_LOCK_FREE == 2, "zeros are sent from signal handlers");
 
 hap_status hapi_spidar_serial_init(hapi_spidar_serial *serial, hap_detail *detail)
 {
@@ -125,6 +133,7 @@ hap_status hapi_spidar_serial_open(hapi_spidar_serial *serial, const char *path,
   }
   close(fd);
   if (status >= HAP_OK) {
+    atomic_fetch_add(&serial->cuts, 1);    /* by who had it before, perhaps */
     if (strcmp(serial->path, path) != 0) { /* opened anew, it stays: others may be reading it */
       snprintf(serial->path, sizeof serial->path, "%s", path);
     }
@@ -184,15 +193,80 @@ int hapi_spidar_serial_latency(const char *path)
 
 /* ---- every tick ---- */
 
+/* Of this process alone: the lock of the port keeps others out. */
+static bool writer_enter(hapi_spidar_serial *serial)
+{
+  uintptr_t none = 0;
+  return atomic_compare_exchange_strong(&serial->writer, &none, (uintptr_t)pthread_self());
+}
+
+static void writer_leave(hapi_spidar_serial *serial)
+{
+  atomic_store(&serial->writer, 0);
+}
+
+/* Bytes that the port took, or -errno. */
+static int port_write(const hapi_spidar_serial *serial, const uint8_t *bytes, int count)
+{
+  ssize_t sent = write(serial->fd, bytes, (size_t)count);
+  if (sent >= 0) {
+    return (int)sent;
+  }
+  /* EINTR: before a byte went out, by a signal handler that zeroed perhaps */
+  return errno == EINTR ? -EAGAIN : -errno;
+}
+
+static void rest_keep(hapi_spidar_serial *serial, const uint8_t *bytes, int count)
+{
+  HAPI_ASSERT(count >= 0 && count <= (int)sizeof serial->rest);
+  memmove(serial->rest, bytes, (size_t)count);
+  serial->rest_count = count;
+}
+
+/* 0: nothing is left of what went before; -errno. */
+static int rest_write(hapi_spidar_serial *serial)
+{
+  static const uint8_t end[HAPI_SPIDAR_FRAME_MAX];
+  unsigned cuts = atomic_load(&serial->cuts);
+  if (cuts != serial->cuts_known) {
+    serial->cuts_known = cuts;
+    rest_keep(serial, end, (int)sizeof end);
+  }
+  if (serial->rest_count == 0) {
+    return 0;
+  }
+  int sent = port_write(serial, serial->rest, serial->rest_count);
+  if (sent > 0) {
+    rest_keep(serial, serial->rest + sent, serial->rest_count - sent);
+  }
+  return sent < 0 ? sent : serial->rest_count > 0 ? -EAGAIN : 0;
+}
+
+/* All bytes or none: 0 or -errno. */
+static int whole_write(hapi_spidar_serial *serial, const uint8_t *bytes, int count)
+{
+  int status = rest_write(serial);
+  if (status < 0) {
+    return status;
+  }
+  int sent = port_write(serial, bytes, count);
+  if (sent <= 0) {
+    return sent < 0 ? sent : -EAGAIN;
+  }
+  rest_keep(serial, bytes + sent, count - sent);
+  return 0;
+}
+
 static int serial_send(void *self, const uint8_t *bytes, int count)
 {
-  const hapi_spidar_serial *serial = self;
-  ssize_t sent = write(serial->fd, bytes, (size_t)count);
-  if (sent < 0) {
-    /* EINTR: before a byte went out, by a signal handler that zeroed perhaps */
-    return errno == EINTR ? -EAGAIN : -errno;
+  hapi_spidar_serial *serial = self;
+  if (!writer_enter(serial)) {
+    return -EAGAIN; /* zeros are going out */
   }
-  return sent == count ? 0 : -EAGAIN;
+  bool first = atomic_load(&serial->forcing) == 0; /* else zeros wait for this one */
+  int sent = first ? whole_write(serial, bytes, count) : -EAGAIN;
+  writer_leave(serial);
+  return sent;
 }
 
 static int serial_receive(void *self, uint8_t *bytes, int size)
@@ -235,16 +309,63 @@ void hapi_spidar_serial_port(hapi_spidar_serial *serial, hapi_spidar_port *out)
                             serial_await, serial_now,  serial_flush};
 }
 
-bool hapi_spidar_serial_force(const hapi_spidar_serial *serial, const uint8_t *bytes, int count)
+/* Who is in the driver is out again in some us. One who has lost the processor needs the caller's,
+ * so the caller sleeps. No wait for a write that this one interrupted, as a signal handler, and none
+ * for other zeros, which may go in between. */
+static bool writer_await(hapi_spidar_serial *serial)
+{
+  const struct timespec pause = {0, WRITER_PAUSE_NS};
+  bool alone = writer_enter(serial);
+  if (!alone && atomic_load(&serial->writer) == (uintptr_t)pthread_self()) {
+    return false;
+  }
+  for (int i = 0; i < WRITER_LOOKS && !alone; ++i) {
+    alone =
+        atomic_load_explicit(&serial->writer, memory_order_relaxed) == 0 && writer_enter(serial);
+  }
+  for (int i = 0; i < WRITER_PAUSES && !alone && atomic_load(&serial->forcing) == 1; ++i) {
+    (void)nanosleep(&pause, NULL);
+    alone = writer_enter(serial);
+  }
+  return alone;
+}
+
+static bool force_alone(hapi_spidar_serial *serial, const uint8_t *bytes, int count)
+{
+  int status = -EAGAIN;
+  for (int i = 0; i < FORCE_TRIES && status == -EAGAIN; ++i) {
+    status = whole_write(serial, bytes, count);
+  }
+  for (int i = 0; i < FORCE_TRIES && status == 0 && serial->rest_count > 0; ++i) {
+    int left = rest_write(serial);
+    status = left == -EAGAIN ? 0 : left;
+  }
+  return status == 0 && serial->rest_count == 0;
+}
+
+/* Somebody who was interrupted here, or hangs in the driver, does not leave. Before and behind it
+ * cuts tells: others may write in between. */
+static bool force_beside(hapi_spidar_serial *serial, const uint8_t *bytes, int count)
+{
+  int sent = -EAGAIN;
+  atomic_fetch_add(&serial->cuts, 1);
+  for (int i = 0; i < FORCE_TRIES && (sent == -EAGAIN || (sent >= 0 && sent < count)); ++i) {
+    sent = port_write(serial, bytes, count);
+  }
+  atomic_fetch_add(&serial->cuts, 1);
+  return sent == count;
+}
+
+bool hapi_spidar_serial_force(hapi_spidar_serial *serial, const uint8_t *bytes, int count)
 {
   int before = errno; /* of what was interrupted */
-  ssize_t sent = 0;
-  for (int i = 0; i < FORCE_TRIES; ++i) {
-    sent = write(serial->fd, bytes, (size_t)count);
-    if (sent == count || (sent < 0 && errno != EAGAIN && errno != EINTR)) {
-      break;
-    }
+  atomic_fetch_add(&serial->forcing, 1);
+  bool alone = writer_await(serial);
+  bool sent = alone ? force_alone(serial, bytes, count) : force_beside(serial, bytes, count);
+  if (alone) {
+    writer_leave(serial);
   }
+  atomic_fetch_sub(&serial->forcing, 1);
   errno = before;
-  return sent == count;
+  return sent;
 }
