@@ -326,6 +326,38 @@ TEST(boards_that_are_silent_fail_and_come_back_by_themselves)
   hap_device_close(h.device);
 }
 
+/* N, of every string of one of two boards. */
+static bool board_pull(int port, int board, double tension)
+{
+  const hapi_spidar_model *model = hapi_spidar_model_find("x4r");
+  hapi_spidar_frame frame = {.board = (uint8_t)board, .command = HAPI_SPIDAR_CURRENT};
+  uint8_t bytes[HAPI_SPIDAR_FRAME_MAX + 28] = {0};
+  for (int i = 0; i < 4; ++i) {
+    frame.current[i] = (int16_t)(tension * model->volts_per_newton[4 * board + i] * 4096.0 / 3.3);
+  }
+  int count = hapi_spidar_encode(&frame, 5, HAPI_SPIDAR_TO_BOARD, bytes) + 28;
+  return write(port, bytes, (size_t)count) == count;
+}
+
+/* Currents of one of two boards are a force; those of both are none. While the emulator stands
+ * still, the second command is on the line all the same, as with boards of metal. */
+TEST(an_emulator_that_was_held_up_catches_up)
+{
+  double place[3];
+  int port = open(machine.port, O_RDWR | O_NOCTTY | O_CLOEXEC);
+  REQUIRE(port >= 0);
+  CHECK(board_pull(port, 0, 2.0) && emulated_await(&machine, false));
+  CHECK(kill(machine.pid, SIGSTOP) == 0);
+  CHECK(board_pull(port, 1, 2.0));
+  emulated_sleep(0.3);
+  CHECK(kill(machine.pid, SIGCONT) == 0);
+  REQUIRE(emulated_state(&machine, "position", place, 3));
+  /* The lower strings alone would pull it by some 30 mm, and the hand is not back so soon. */
+  CHECK_SAY(hapi_v3_norm(place) < 0.01, "%g mm off", 1e3 * hapi_v3_norm(place));
+  CHECK(board_pull(port, 0, 0.0) && board_pull(port, 1, 0.0) && emulated_await(&machine, true));
+  close(port);
+}
+
 /* Each way by itself: a device that reads and writes would be told by either. */
 TEST(a_port_that_was_hung_up_fails_to_read_and_to_write)
 {

@@ -24,6 +24,7 @@
 #define WAKE_LEAST_S 20e-6
 #define WAKE_MOST_S 1e-3
 #define BEHIND_MOST_S 1.0 /* more, and the machine was asleep: simulated time stands still for it */
+#define SLICE_S 1e-3      /* of the time that it is behind */
 #define SAY_MAX 1024
 #define AHEAD_S \
   1e-3 /* that bytes may wait for the line: as with a port, the host notices the rest */
@@ -228,6 +229,17 @@ static void bytes_await(program *p, double now)
   }
 }
 
+/* What has been waiting in the port is on the line at once, and boards go on while this process is
+ * held up: else half of a cycle of commands would stay until it is awake. */
+static void program_catch_up(program *p, double now)
+{
+  while (emulator_time(&p->emulator) + SLICE_S < now) {
+    double next = emulator_time(&p->emulator) + SLICE_S;
+    emulator_advance(&p->emulator, next);
+    bytes_exchange(p, next);
+  }
+}
+
 static int program_run(program *p)
 {
   p->start = clock_now();
@@ -238,6 +250,7 @@ static int program_run(program *p)
       p->start += behind;
       now -= behind;
     }
+    program_catch_up(p, now);
     emulator_advance(&p->emulator, now);
     if (!follow_plug(p)) {
       return usage_complain("no pseudo-terminal could be opened");
