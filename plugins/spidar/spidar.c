@@ -11,6 +11,7 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
+#include "base/pose.h"
 #include "base/safety.h"
 #include "base/vec.h"
 
@@ -20,6 +21,7 @@
 #define ANSWER_S 0.25                /* for an exchange of start */
 #define PERIOD_S 1e-3                /* between two writes, at least */
 #define BYTE_S 5e-6                  /* 10 bits of 2 Mbit/s */
+#define LATE_LEAST_S 0.002           /* of a read: less is a loop's own jitter */
 #define WRITE_LATE_S 0.01            /* a longer pause between two writes counts as this */
 #define LITTLE 0.01                  /* of the greatest force */
 #define WRAP 65536.0
@@ -98,8 +100,9 @@ static hapi_spidar_fit solve_pose(hapi_spidar_device *device)
   return hapi_spidar_solve(&device->belief.solver, &device->model, lengths);
 }
 
-/* Into pose and twist, at the times of the reads, so that both are of one motion, whatever the port
- * delays. False: replies have been doubted for too long, while all strings were pulled. */
+/* Into pose and twist, at the time of the read before: boards answer with the positions of when they
+ * were asked, and in a gap they are not. So a loop that was late is no doubt about the strings.
+ * False: replies have been doubted for too long, while all strings were pulled. */
 static bool believe_counts(hapi_spidar_device *device, int64_t time_ns)
 {
   double counts[HAPI_SPIDAR_STRINGS_MAX];
@@ -121,7 +124,11 @@ static bool believe_counts(hapi_spidar_device *device, int64_t time_ns)
 
 static void to_frame(const hapi_spidar_device *device, hap_pose *pose, hap_twist *twist)
 {
-  const hap_pose *grip = &device->belief.solver.pose;
+  hap_pose now = device->belief.solver.pose;
+  const hap_pose *grip = &now;
+  if (device->late > 0.0) {
+    hapi_pose_move(&now, &device->belief.twist, device->late);
+  }
   const double *r = device->settings.rotate;
   hapi_pose_point(device->settings.offset, r, grip->position, pose->position);
   /* Turned as the grip is, in the axes of the frame: at home it is the identity. */
@@ -150,15 +157,27 @@ static bool needs_restart(const hapi_spidar_device *device)
          cause == HAPI_SPIDAR_STALLED || cause == HAPI_SPIDAR_GUARD_LOST;
 }
 
+/* s, by which the newest positions are older than those of a loop that is in time. */
+static double late_by(const hapi_spidar_device *device, int64_t time_ns)
+{
+  double gap = device->read_ns >= 0 ? 1e-9 * (double)(time_ns - device->read_ns) : 0.0;
+  double late = gap - device->read_gap;
+  return late > LATE_LEAST_S && gap < HAPI_SAFETY_GAP_MOST_S ? late : 0.0;
+}
+
 /* What has come, into pose and twist. */
 static hap_status take_answer(hapi_spidar_device *device, int64_t time_ns)
 {
   int taken = hapi_spidar_line_receive(&device->line);
+  int64_t asked_ns = device->read_ns >= 0 ? device->read_ns : time_ns;
+  device->late = late_by(device, time_ns);
+  device->read_gap = 1e-9 * (double)(time_ns - asked_ns);
+  device->read_ns = time_ns;
   if (taken < 0) {
     return device_fail(device, HAPI_SPIDAR_HUNG_UP);
   }
   if (taken > 0) {
-    if (!believe_counts(device, time_ns)) {
+    if (!believe_counts(device, asked_ns)) {
       return device_fail(device, HAPI_SPIDAR_MISFIT);
     }
     set_cause(device, HAPI_SPIDAR_WELL);
@@ -439,6 +458,9 @@ static void reset_ticks(hapi_spidar_device *device)
   memset(device->current, 0, sizeof device->current);
   memset(device->rest, 0, sizeof device->rest);
   device->written = -1.0;
+  device->read_ns = -1;
+  device->read_gap = 0.0;
+  device->late = 0.0;
   device->poor = -1.0;
   device->doubted = false;
   device->asked = false;

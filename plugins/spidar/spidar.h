@@ -65,9 +65,12 @@ typedef struct hapi_spidar_device {
   _Atomic int cause;  /* hapi_spidar_cause, of now */
   hapi_spidar_told told;
   hapi_spidar_belief belief;
-  bool doubted; /* the newest reply, or a string of it */
-  double poor;  /* s, when replies began to be doubted; < 0: they are not */
-  double taut;  /* s, when the strings began to be pulled after a zero */
+  int64_t read_ns; /* of the newest read; < 0: there was none since start */
+  double read_gap; /* s, to the one before */
+  double late;     /* s, on which the believed pose is carried: the loop was late */
+  bool doubted;    /* the newest reply, or a string of it */
+  double poor;     /* s, when replies began to be doubted; < 0: they are not */
+  double taut;     /* s, when the strings began to be pulled after a zero */
   hapi_spidar_tensions tensions;
   hapi_spidar_heat heat;
   double written; /* s, of the newest write; < 0: the strings had no tension before */
