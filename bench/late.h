@@ -12,11 +12,12 @@
 #define LATE_STEP_N 2.0     /* a change from tick to tick that counts as a step */
 #define LATE_PEAK_RATIO 1.2 /* bound of peak and steps */
 #define LATE_BACK_MS 200
+#define LATE_SPIDAR "spidar"
 
 /* A run in which a loop of 1 kHz is stopped in pulses, from tick begin to tick end. */
 typedef struct late_def {
   const char *scene;
-  const char *device; /* spec; NULL: the scene's own */
+  const char *device; /* spec; NULL: the scene's own; LATE_SPIDAR: an emulated one */
   int ticks;
   int begin;
   int end;
@@ -29,7 +30,8 @@ typedef struct late_result {
   double peak; /* N */
   double step; /* N, largest change from tick to tick */
   unsigned steps;
-  double gave; /* J, largest that the force gave to the hand since it had taken most */
+  double pulled; /* N, largest of the strings on the grip; of a SPIDAR */
+  double gave;   /* J, largest that the force gave to the hand since it had taken most */
   uint64_t missed;
   uint64_t derated; /* ticks with less force */
   uint32_t fault;   /* hap_fault at the end */

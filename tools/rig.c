@@ -56,11 +56,10 @@ static hap_status take_identity(const char *path, hap_device *device, hap_detail
 }
 
 /* A device of hardware has its own frame: its origin is put where the scene's own hand begins. */
-static void place_device(const hap_device *device, const char *hand, hap_pose *out)
+static void place_device(const char *hand, hap_pose *out)
 {
   hap_device *scenes_own = NULL;
-  if (hapi_device_ops(device)->pacing == HAP_PACING_VIRTUAL || hand == NULL ||
-      hap_device_open(hand, &scenes_own, NULL) < HAP_OK) {
+  if (hand == NULL || hap_device_open(hand, &scenes_own, NULL) < HAP_OK) {
     return;
   }
   const hap_device_ops *ops = hapi_device_ops(scenes_own);
@@ -81,6 +80,22 @@ static void set_tool(const double edges[3], double out[8][3])
   }
 }
 
+static hap_status open_device(const rig_options *options, rig *r, size_t index, hap_detail *detail)
+{
+  const scene_parameters *p = &r->scene->parameters;
+  const char *spec = device_spec(options, r->scene, index);
+  if (index == 0 && options->hardware != NULL) {
+    return HAP_OK; /* as it is since the begin */
+  }
+  if (strcmp(spec, "virtual") == 0) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "scene %s has %d simulated hands: give device %zu a motion, as in "
+                     "virtual:path=0:0/0/0;1:0.1/0/0",
+                     p->name, p->pointers, index + 1);
+  }
+  return hap_device_open(spec, &r->devices[index], detail);
+}
+
 static hap_status add_pointer(const rig_options *options, rig *r, size_t index, hap_detail *detail)
 {
   const scene_parameters *p = &r->scene->parameters;
@@ -88,14 +103,7 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   hap_pointer_expert_def expert;
   hap_pointer_research_def research;
   pointer_defs_init(&def, &expert, &research);
-  const char *spec = device_spec(options, r->scene, index);
-  if (strcmp(spec, "virtual") == 0) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                     "scene %s has %d simulated hands: give device %zu a motion, as in "
-                     "virtual:path=0:0/0/0;1:0.1/0/0",
-                     p->name, p->pointers, index + 1);
-  }
-  hap_status status = hap_device_open(spec, &r->devices[index], detail);
+  hap_status status = open_device(options, r, index, detail);
   if (status >= HAP_OK) {
     status = take_identity(options->identities[index], r->devices[index], detail);
   }
@@ -104,7 +112,10 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   }
   def.device = r->devices[index];
   const char *hand = index < (size_t)p->pointers ? p->hands[index] : NULL;
-  place_device(def.device, hand, &def.pose_world_device);
+  bool hardware = index == 0 && options->hardware != NULL;
+  if (hardware || hapi_device_ops(def.device)->pacing != HAP_PACING_VIRTUAL) {
+    place_device(hand, &def.pose_world_device);
+  }
   double hull[8][3];
   def.radius = p->radius;
   if (p->tool[0] > 0.0) {
@@ -176,7 +187,9 @@ hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
       options->parameters != NULL
           ? scene_create_from(options->parameters, options->count, &out->scene, detail)
           : scene_create(options->scene, &out->scene, detail);
+  out->devices[0] = options->hardware;
   if (status < HAP_OK) {
+    rig_destroy(out);
     return status;
   }
   size_t own = (size_t)out->scene->parameters.pointers;

@@ -21,6 +21,9 @@ typedef struct rig_options {
   const char *devices[RIG_POINTERS_MAX]; /* specs in pointer order; "virtual" alone: the scene's
                                             own simulated hand; none given: the same */
   size_t device_count;
+  /* Pointer 0's, which the rig takes over and puts where the scene's own hand begins; NULL: as
+   * devices says */
+  hap_device *hardware;
   /* files for the devices; NULL: as they say themselves */
   const char *identities[RIG_POINTERS_MAX];
   double max_force;     /* N; 0: 20 */
