@@ -18,6 +18,36 @@
 
 #define LATE_HZ 1000
 
+const late_pulse late_busy[LATE_BUSY] = {
+    {7, 1}, {1, 1}, {4, 2},  {1, 4},  {2, 1}, {1, 1}, {2, 3},  {3, 2}, {2, 2}, {3, 2}, {1, 1},
+    {3, 2}, {4, 2}, {2, 2},  {1, 4},  {2, 2}, {3, 2}, {5, 3},  {6, 4}, {3, 7}, {9, 2}, {2, 2},
+    {7, 2}, {2, 2}, {4, 2},  {1, 3},  {1, 1}, {3, 1}, {3, 1},  {2, 2}, {2, 2}, {1, 1}, {3, 2},
+    {5, 2}, {8, 2}, {2, 4},  {1, 3},  {4, 2}, {4, 2}, {5, 5},  {6, 2}, {4, 2}, {2, 2}, {3, 1},
+    {1, 1}, {5, 3}, {13, 3}, {2, 2},  {2, 2}, {1, 1}, {5, 1},  {1, 2}, {4, 3}, {3, 2}, {2, 3},
+    {2, 2}, {2, 2}, {5, 2},  {4, 1},  {6, 2}, {2, 2}, {6, 2},  {3, 1}, {9, 3}, {4, 4}, {8, 1},
+    {2, 1}, {7, 2}, {2, 1},  {5, 1},  {8, 2}, {1, 7}, {2, 2},  {7, 1}, {4, 1}, {8, 2}, {3, 1},
+    {1, 3}, {1, 2}, {2, 3},  {4, 1},  {2, 2}, {2, 1}, {13, 3}, {4, 1}, {1, 1}, {2, 3}, {1, 2},
+    {1, 1}, {3, 1}, {3, 1},  {23, 1}, {7, 1}, {3, 1}, {2, 2},  {2, 2}, {1, 1}, {2, 1}, {2, 1},
+    {2, 2}, {3, 1}, {2, 2},  {2, 2},  {2, 3}, {2, 3}, {8, 2},  {2, 6}, {1, 1}, {4, 2}, {8, 4},
+    {1, 4}, {3, 2}, {6, 4},  {2, 2},  {4, 2}, {1, 1}, {1, 2},  {1, 4}, {2, 2}, {2, 2}};
+
+/* Whether the loop runs in a tick: pulses begin with tick 0, wherever the run is disturbed. */
+static bool late_runs(const late_def *def, int tick)
+{
+  uint32_t all = 0;
+  for (int i = 0; i < def->pulse_count; ++i) {
+    all += def->pulses[i].run + def->pulses[i].stop;
+  }
+  uint32_t at = (uint32_t)tick % all;
+  for (int i = 0; i < def->pulse_count; ++i) {
+    if (at < def->pulses[i].run + def->pulses[i].stop) {
+      return at < def->pulses[i].run;
+    }
+    at -= def->pulses[i].run + def->pulses[i].stop;
+  }
+  return true;
+}
+
 typedef struct late_felt {
   double force[3];
   double peak; /* N */
@@ -76,9 +106,9 @@ static hap_status late_ticks(bench *b, const rig *r, const late_def *def, late_r
   uint64_t derated = 0;
   double least = 0.0;
   for (int t = 0; t < def->ticks; ++t) {
-    bool pulsed = t >= def->begin && t < def->end;
-    r->session->run_ticks = def->run_ticks;
-    r->session->stop_ticks = pulsed ? def->stop_ticks : 0;
+    bool pulsed = def->pulse_count > 0 && t >= def->begin && t < def->end;
+    r->session->run_ticks = 0;
+    r->session->stop_ticks = pulsed && !late_runs(def, t) ? 1 : 0;
     hap_status status = late_tick(b, r, &felt);
     if (status < HAP_OK) {
       return status;
@@ -131,11 +161,6 @@ hap_status late_run(bench *b, const late_def *def, late_result *out)
 
 /* ---- the program ---- */
 
-typedef struct late_pulse {
-  uint32_t stop;
-  uint32_t run;
-} late_pulse;
-
 #define LATE_HEADER                                                                            \
   "scene,stop_ms,run_ms,begin_ms,peak_n,peak_ratio,steps,steps_without,step_n,missed,derated," \
   "fault,back_ms,device,pulled_n,pulled_without_n"
@@ -143,6 +168,12 @@ typedef struct late_pulse {
 static hap_status late_row(bench *b, FILE *csv, late_def def, const late_result *still)
 {
   late_result now;
+  char pulse[32] = "busy loops";
+  uint32_t stop = def.pulse_count == 1 ? def.pulses[0].stop : 0;
+  uint32_t run = def.pulse_count == 1 ? def.pulses[0].run : 0;
+  if (def.pulse_count == 1) {
+    (void)snprintf(pulse, sizeof pulse, "%u/%u ms", stop, run);
+  }
   hap_status status = late_run(b, &def, &now);
   if (status < HAP_OK) {
     return status;
@@ -153,23 +184,23 @@ static hap_status late_row(bench *b, FILE *csv, late_def def, const late_result 
   const char *fault = now.fault == HAP_FAULT_NONE   ? "none"
                       : now.fault == HAP_FAULT_LATE ? "latched"
                                                     : "another one";
-  bool told = now.fault != HAP_FAULT_NONE || now.derated > 0 || def.stop_ticks <= 5;
+  bool told = now.fault != HAP_FAULT_NONE || now.derated > 0 || (stop > 0 && stop <= 5);
   bool back = now.fault != HAP_FAULT_NONE || now.back_ms <= LATE_BACK_MS;
-  fprintf(csv, "%s,%u,%u,%d,%.4f,%.3f,%u,%u,%.3f,%llu,%llu,%s,%d,%s,%.3f,%.3f\n", def.scene,
-          def.stop_ticks, def.run_ticks, def.begin, now.peak, ratio, now.steps, still->steps,
-          now.step, (unsigned long long)now.missed, (unsigned long long)now.derated, fault,
-          now.back_ms, device, now.pulled, still->pulled);
+  fprintf(csv, "%s,%u,%u,%d,%.4f,%.3f,%u,%u,%.3f,%llu,%llu,%s,%d,%s,%.3f,%.3f\n", def.scene, stop,
+          run, def.begin, now.peak, ratio, now.steps, still->steps, now.step,
+          (unsigned long long)now.missed, (unsigned long long)now.derated, fault, now.back_ms,
+          device, now.pulled, still->pulled);
   bench_check(
       b,
       told && back && fmax(ratio, pulled) <= LATE_PEAK_RATIO &&
           now.steps <= LATE_PEAK_RATIO * still->steps &&
           (now.fault == HAP_FAULT_NONE || now.fault == HAP_FAULT_LATE),
-      "%s, %s %u/%u ms from %d ms: %.2f N, %.2f of that without pulses; %u steps above 2 N "
+      "%s, %s, %s from %d ms: %.2f N, %.2f of that without pulses; %u steps above 2 N "
       "(%u without), largest %.2f N; %llu ticks with less force, fault %s, back after %d ms; gave "
       "%.1f mJ (%.1f); strings %.2f N (%.2f)",
-      def.scene, device, def.stop_ticks, def.run_ticks, def.begin, now.peak, ratio, now.steps,
-      still->steps, now.step, (unsigned long long)now.derated, fault, now.back_ms, 1e3 * now.gave,
-      1e3 * still->gave, now.pulled, still->pulled);
+      def.scene, device, pulse, def.begin, now.peak, ratio, now.steps, still->steps, now.step,
+      (unsigned long long)now.derated, fault, now.back_ms, 1e3 * now.gave, 1e3 * still->gave,
+      now.pulled, still->pulled);
   return HAP_OK;
 }
 
@@ -186,16 +217,16 @@ static hap_status late_scene(bench *b, FILE *csv, const late_plan *plan)
 {
   static const late_pulse pulses[] = {{8, 8},   {12, 4}, {15, 5}, {30, 10}, {3, 1},
                                       {45, 45}, {2, 1},  {5, 3},  {10, 20}, {25, 4}};
-  late_def def = {
-      .scene = plan->scene, .device = plan->device, .ticks = plan->ticks, .run_ticks = 1};
+  late_def def = {.scene = plan->scene, .device = plan->device, .ticks = plan->ticks};
   late_result still;
   hap_status status = late_run(b, &def, &still);
-  for (size_t i = 0; i < BENCH_COUNT(pulses); ++i) {
+  for (size_t i = 0; i <= BENCH_COUNT(pulses); ++i) {
+    bool alone = i < BENCH_COUNT(pulses);
+    def.pulses = alone ? &pulses[i] : late_busy;
+    def.pulse_count = alone ? 1 : LATE_BUSY;
     for (int begin = plan->first; begin < (b->quick ? plan->first + 1 : plan->last); begin += 107) {
       def.begin = begin;
       def.end = begin + 1000;
-      def.stop_ticks = pulses[i].stop;
-      def.run_ticks = pulses[i].run;
       if (status >= HAP_OK) {
         status = late_row(b, csv, def, &still);
       }

@@ -521,19 +521,19 @@ TEST(an_old_model_fades_by_the_time_that_has_passed)
 
 /* peak and steps: no more than 1.2 of what they are without pulses. A loop that is late is no fault
  * of the device. */
-static void check_pulses(late_def def, int first, uint32_t stop, uint32_t run)
+static void check_pulses(late_def def, int first, const late_pulse *pulses, int count)
 {
   bench b = {.out = "."};
   late_result still;
   late_result now;
   REQUIRE(late_run(&b, &def, &still) >= HAP_OK);
   CHECK(still.derated == 0 && still.missed == 0 && still.steps == 0 && still.peak > 4.0);
-  def.stop_ticks = stop, def.run_ticks = run;
+  def.pulses = pulses, def.pulse_count = count;
   for (def.begin = first; def.begin < first + 900; def.begin += 614) {
     def.end = def.begin + 1000;
     REQUIRE(late_run(&b, &def, &now) >= HAP_OK);
     printf("# %s %u/%u from %d: %.3g N of %.3g, %u steps, %llu derated, fault %u, back %d ms\n",
-           def.scene, stop, run, def.begin, now.peak, still.peak, now.steps,
+           def.scene, pulses[0].stop, pulses[0].run, def.begin, now.peak, still.peak, now.steps,
            (unsigned long long)now.derated, now.fault, now.back_ms);
     CHECK(now.missed > 400 && now.derated > 200);
     CHECK(now.peak <= 1.2 * still.peak && now.steps == 0);
@@ -544,13 +544,15 @@ static void check_pulses(late_def def, int first, uint32_t stop, uint32_t run)
 
 TEST(a_loop_stopped_in_pulses_shakes_no_hand)
 {
-  static const uint32_t pulses[4][2] = {{8, 8}, {12, 4}, {15, 5}, {30, 10}};
-  const late_def row = {.scene = "row10", .ticks = 2500, .run_ticks = 1};
-  const late_def wedge = {.scene = "wedge", .ticks = 2500, .run_ticks = 1};
-  const late_def spidar = {.scene = "row10", .device = LATE_SPIDAR, .ticks = 4200, .run_ticks = 1};
-  for (int i = 0; i < 4; ++i) {
-    check_pulses(row, 300, pulses[i][0], pulses[i][1]);
-    check_pulses(wedge, 300, pulses[i][0], pulses[i][1]);
-    check_pulses(spidar, 1914, pulses[i][0], pulses[i][1]);
+  static const late_pulse pulses[4] = {{8, 8}, {12, 4}, {15, 5}, {30, 10}};
+  const late_def row = {.scene = "row10", .ticks = 2500};
+  const late_def wedge = {.scene = "wedge", .ticks = 2500};
+  const late_def spidar = {.scene = "row10", .device = LATE_SPIDAR, .ticks = 4200};
+  for (int i = 0; i <= 4; ++i) {
+    const late_pulse *some = i < 4 ? &pulses[i] : late_busy;
+    int count = i < 4 ? 1 : LATE_BUSY;
+    check_pulses(row, 300, some, count);
+    check_pulses(wedge, 300, some, count);
+    check_pulses(spidar, 1914, some, count);
   }
 }
