@@ -38,7 +38,7 @@ static bool late_runs(const late_def *def, int tick)
   for (int i = 0; i < def->pulse_count; ++i) {
     all += def->pulses[i].run + def->pulses[i].stop;
   }
-  uint32_t at = (uint32_t)tick % all;
+  uint32_t at = all > 0 ? (uint32_t)tick % all : 0;
   for (int i = 0; i < def->pulse_count; ++i) {
     if (at < def->pulses[i].run + def->pulses[i].stop) {
       return at < def->pulses[i].run;

@@ -198,6 +198,7 @@ static void emulator_step(emulator *e)
   tick_boards(e, emulator_time(e));
   follow_motors(e);
   grip_step(&e->grip, e->pull, &other, 1.0 / EMULATOR_STEP_HZ);
+  e->pulled = fmax(e->pulled, hapi_v3_norm(e->grip.wrench.force));
   ++e->steps;
 }
 
@@ -290,7 +291,9 @@ static void encoder_spoil(emulator *e, int string, const int16_t *false_by, cons
     int motors = hapi_spidar_kind_find(b->model)->motors;
     for (int k = 0; k < motors; ++k) {
       if (string < 0 || string == first + k) {
-        b->lies.false_by[k] = false_by != NULL ? *false_by : b->lies.false_by[k];
+        if (false_by != NULL) {
+          b->lies.false_by[k] = *false_by;
+        }
         b->lies.stuck[k] = stuck != NULL ? *stuck : b->lies.stuck[k];
       }
     }
@@ -378,6 +381,7 @@ void emulator_say(const emulator *e, char *out, size_t size)
   used += say_list(out + used, size - used, "quat", e->grip.pose.quat_wxyz, 4);
   used += say_list(out + used, size - used, "force", e->grip.wrench.force, 3);
   used += say_list(out + used, size - used, "torque", e->grip.wrench.torque, 3);
+  used += say_list(out + used, size - used, "pulled", &e->pulled, 1);
   used += say_list(out + used, size - used, "tension", e->grip.tension, e->model->strings);
   (void)say_list(out + used, size - used, "current", current, e->model->strings);
 }

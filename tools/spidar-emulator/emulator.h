@@ -75,6 +75,7 @@ typedef struct emulator {
   double next_tick[HAPI_SPIDAR_BOARDS];
   double home[HAPI_SPIDAR_STRINGS_MAX]; /* m, lengths at power-on */
   double pull[HAPI_SPIDAR_STRINGS_MAX]; /* N, of the motors */
+  double pulled;                        /* N, largest force of all strings on the grip so far */
   bool plugged;
   double plug_time; /* s, when it is plugged in again; < 0: never by itself */
   uint32_t dice;
