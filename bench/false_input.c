@@ -11,7 +11,9 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
+#include "base/safety.h"
 #include "base/vec.h"
+#include "bench/seen.h"
 #include "device/device.h"
 #include "tools/session_defs.h"
 #include "tools/spidar-emulator/driven.h"
@@ -29,6 +31,7 @@
 #define OLD_MAX 512  /* ticks that are kept */
 #define STRING 2     /* the one that is false */
 #define HOLD_S 0.004 /* between new positions of the coarse device */
+#define QUANTUM 5e-5 /* m, of the same */
 
 /* At home until the strings are wound in; against the surface, and then to and fro along it and a
  * little against it. */
@@ -45,6 +48,8 @@ typedef struct stage {
   hap_pointer_id pointer;
   uint32_t dice;
   uint64_t reads;
+  seen_motion seen;
+  double seen_s; /* < 0: nothing was */
   /* Of the virtual device. */
   hap_device *inner;
   hap_pose told[OLD_MAX]; /* rings: what was right */
@@ -119,6 +124,13 @@ static bool is_spiked(stage *s, double since)
   return since >= 0.0 && dice_throw(s) < share;
 }
 
+static void seen_note(stage *s, double since, bool is_seen)
+{
+  if (is_seen && since >= 0.0 && s->seen_s < 0.0) {
+    s->seen_s = since;
+  }
+}
+
 /* ---- SPIDAR ---- */
 
 static void tell_off(driven_spidar *d, int string, double counts)
@@ -143,6 +155,30 @@ static void tell_old(stage *s, driven_spidar *d)
       tell_off(d, 4 * i + k, old - w->boards[i].counts[k]);
     }
   }
+}
+
+/* What the boards tell from now on, held against what the encoders would. */
+static void spidar_see(stage *s, const driven_spidar *d, double since)
+{
+  const emulator *e = &d->emulator;
+  const hapi_spidar_model *model = &d->device.model;
+  const seen_bounds bounds = {.period = 1.0 / s->def->haptic_hz,
+                              .hit = HAPI_SAFETY_STRING_SHARE * HAPI_SAFETY_ACCELERATION_LIMIT,
+                              .swing = HAPI_SAFETY_STRING_SHARE * HAPI_SAFETY_SWING_LIMIT,
+                              .quantum = fabs(model->metres_per_count[0])};
+  double told[SEEN_WAYS];
+  double error[SEEN_WAYS];
+  for (int i = 0; i < SEEN_WAYS; ++i) {
+    const board *b = &e->wire.boards[i / 4];
+    double count = b->counts[i % 4] + b->lies.false_by[i % 4];
+    double right =
+        e->first_count + round((e->grip.wound[i] - e->home[i]) / model->metres_per_count[i]);
+    told[i] = count * model->metres_per_count[i];
+    error[i] = told[i] - right * model->metres_per_count[i];
+  }
+  bool moves = seen_motion_take(&s->seen, &bounds, told, SEEN_WAYS);
+  bool fits = seen_misfit(model->motor, model->grip, &e->grip.pose, error) <= model->residual;
+  seen_note(s, since, moves || !fits);
 }
 
 static void spidar_spoil(driven_spidar *d, double time, void *user)
@@ -200,6 +236,7 @@ static void spidar_spoil(driven_spidar *d, double time, void *user)
     case FALSE_KINDS:
       break;
   }
+  spidar_see(s, d, time - FALSE_INPUT_BEGIN_S);
 }
 
 /* ---- virtual ---- */
@@ -286,6 +323,17 @@ static void pose_spoil(stage *s, double since, hap_pose *io, hap_twist *twist)
   }
 }
 
+/* Of a device that tells each position for some time the first of them counts. */
+static void pose_see(stage *s, double since, const hap_pose *told, bool is_first)
+{
+  bool coarse = s->def->device == FALSE_INPUT_COARSE;
+  const seen_bounds bounds = {.period = coarse ? HOLD_S : 1.0 / s->def->haptic_hz,
+                              .hit = HAPI_SAFETY_ACCELERATION_LIMIT,
+                              .swing = HAPI_SAFETY_SWING_LIMIT,
+                              .quantum = coarse ? QUANTUM : 0.0};
+  seen_note(s, since, is_first && seen_motion_take(&s->seen, &bounds, told->position, 3));
+}
+
 static hap_status wrapped_read(void *self, int64_t time_ns, hap_device_input *const out[])
 {
   hap_device_input *in = out[0];
@@ -303,7 +351,9 @@ static hap_status wrapped_read(void *self, int64_t time_ns, hap_device_input *co
   s->told[before % OLD_MAX] = in->pose;
   s->told_twist[before % OLD_MAX] = in->twist;
   ++s->reads;
-  pose_spoil(s, false_time(1e-9 * (double)time_ns), &in->pose, &in->twist);
+  double time = 1e-9 * (double)time_ns;
+  pose_spoil(s, false_time(time), &in->pose, &in->twist);
+  pose_see(s, time - FALSE_INPUT_BEGIN_S, &in->pose, !keeps);
   return status;
 }
 
@@ -469,6 +519,7 @@ static hap_status run_measure(stage *s, false_input_run *out, hap_detail *detail
       }
     }
   }
+  out->seen_s = s->seen_s;
   if (status < HAP_OK) {
     (void)hap_session_detail(s->session, detail);
   }
@@ -484,6 +535,7 @@ hap_status false_input_measure(const false_input_def *def, false_input_run *out,
   }
   s->def = def;
   s->dice = def->seed;
+  s->seen_s = -1.0;
   build_world(s);
   hap_status status = session_create(s, detail);
   status = status >= HAP_OK ? pointer_add(s, detail) : status;
@@ -508,6 +560,12 @@ static void run_extremes(const false_input_def *def, const false_input_run *run,
     *out_peak = fmax(*out_peak, hapi_v3_norm(run->force[i]));
     *out_step = fmax(*out_step, hapi_v3_norm(change));
   }
+}
+
+bool false_input_is_told(const false_input_run *run)
+{
+  return run->seen_s < 0.0 ||
+         (run->told_s >= 0.0 && run->told_s <= run->seen_s + FALSE_INPUT_TOLD_S);
 }
 
 void false_input_compare(const false_input_def *def, const false_input_run *right,

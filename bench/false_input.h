@@ -15,6 +15,7 @@
 #define FALSE_INPUT_BEGIN_S 2.0  /* of what is false */
 #define FALSE_INPUT_LENGTH_S 0.2 /* so long */
 #define FALSE_INPUT_END_S 2.6    /* of the run */
+#define FALSE_INPUT_TOLD_S 0.02  /* from what can be seen to the flag of the guard */
 #define FALSE_INPUT_HZ_MAX 10000
 #define FALSE_INPUT_TICKS_MAX 26000
 
@@ -55,6 +56,7 @@ typedef struct false_input_run {
   uint32_t fault;                         /* hap_fault that latched */
   double fault_s;                         /* from FALSE_INPUT_BEGIN_S; < 0: none */
   double told_s;                          /* when a flag of the guard said so first; < 0: never */
+  double seen_s;                          /* when seen.h shows it first; < 0: never */
   bool doubted;   /* at any time, the guard said that the device is not believed */
   char text[600]; /* of the fault */
 } false_input_run;
@@ -73,6 +75,8 @@ const char *false_input_device_name(false_input_device device);
 
 HAP_NODISCARD hap_status false_input_measure(const false_input_def *def, false_input_run *out,
                                              hap_detail *detail);
+/* What can be seen is told in time. */
+bool false_input_is_told(const false_input_run *run);
 void false_input_compare(const false_input_def *def, const false_input_run *right,
                          const false_input_run *run, false_input_figures *out);
 

@@ -15,6 +15,7 @@
 #include "base/safety.h"
 #include "base/vec.h"
 #include "bench/false_input.h"
+#include "bench/seen.h"
 #include "plugins/spidar/belief.h"
 #include "plugins/spidar/calibration.h"
 #include "pointer/plausible.h"
@@ -32,7 +33,8 @@ static void run_measure(const false_input_def *def, false_input_run *out)
   REQUIRE_SAY(false_input_measure(def, out, &detail) >= HAP_OK, "%s", detail.text);
 }
 
-/* What is false never makes more than a tenth more force, nor 2 N in 2 ms. */
+/* What is false never makes more than a tenth more force, nor 2 N in 2 ms; and it is told 20 ms
+ * after it can be seen. */
 static void look_at(const false_input_def *def)
 {
   false_input_figures f;
@@ -45,6 +47,8 @@ static void look_at(const false_input_def *def)
   CHECK(f.peak_right > 4.0);
   CHECK(f.peak <= 1.1 * f.peak_right);
   CHECK(f.step <= 2.0 + f.step_right);
+  CHECK_SAY(false_input_is_told(&run), "to be seen at %.0f ms, told at %.0f ms", 1e3 * run.seen_s,
+            1e3 * run.told_s);
   if (def->kind == FALSE_ALWAYS || def->kind == FALSE_ALL_ALWAYS) {
     CHECK(run.told_s >= 0.0 && run.told_s <= 0.02);
     CHECK(run.fault == HAP_FAULT_DEVICE_INPUT && run.fault_s <= 0.0205);
@@ -56,6 +60,7 @@ static void look_at_all(false_input_def *def, const false_input_kind *kinds, int
   def->kind = FALSE_NOTHING;
   run_measure(def, &right);
   CHECK(right.fault == HAP_FAULT_NONE && right.told_s < 0.0 && !right.doubted);
+  CHECK(right.seen_s < 0.0);
   for (int i = 0; i < count; ++i) {
     def->kind = kinds[i];
     look_at(def);
@@ -107,6 +112,73 @@ TEST(a_device_that_is_slow_to_tell_is_believed)
     false_input_compare(&def, &right, &right, &f);
     CHECK(f.step_right <= 0.2);
   }
+}
+
+/* ---- what can be seen ---- */
+
+static seen_motion track;
+
+/* A hand that swings as hard as it may, then leaves its way. */
+static int first_seen(const seen_bounds *bounds, double acceleration, double leap)
+{
+  double rate = sqrt(acceleration / 0.02); /* a swing of 20 mm */
+  int seen = -1;
+  memset(&track, 0, sizeof track);
+  for (int i = 0; i < 1000; ++i) {
+    double x = 0.02 * sin(rate * i * bounds->period) + (i >= 600 ? leap : 0.0);
+    double told = bounds->quantum > 0.0 ? bounds->quantum * round(x / bounds->quantum) : x;
+    seen = seen_motion_take(&track, bounds, &told, 1) && seen < 0 ? i : seen;
+  }
+  return seen;
+}
+
+TEST(what_no_hand_does_is_seen)
+{
+  static const double periods[] = {1e-3, 2e-4, 4e-3};
+  for (int i = 0; i < 3; ++i) {
+    seen_bounds bounds = {.period = periods[i], .hit = 500.0, .swing = 300.0};
+    double h = hapi_max(periods[i], 1e-3);
+    double least = 300.0 * h * h + 200.0 * 1e-3 * h;
+    CHECK(first_seen(&bounds, 299.0, 0.0) < 0);
+    CHECK(first_seen(&bounds, 0.1, 1.05 * least) == 600);
+    CHECK(first_seen(&bounds, 0.1, 0.95 * least) < 0);
+    bounds.quantum = 5e-5;
+    CHECK(first_seen(&bounds, 299.0, 0.0) < 0);
+    CHECK(first_seen(&bounds, 0.1, 1.05 * least + 2e-4) == 600);
+  }
+  CHECK(first_seen(&(seen_bounds){.period = 1e-3, .hit = 500.0, .swing = 300.0}, 450.0, 0.0) >= 0);
+}
+
+TEST(lengths_that_fit_no_pose_are_seen)
+{
+  const hapi_spidar_model *model = hapi_spidar_model_find("x4r");
+  hap_pose pose = {{0.004, -0.006, 0.003}, {1.0, 0.05, -0.03, 0.02}};
+  double right_lengths[HAPI_SPIDAR_STRINGS_MAX];
+  hapi_quat_normalize(pose.quat_wxyz);
+  hapi_spidar_lengths(model, &pose, right_lengths);
+  for (int string = 0; string < 8; ++string) {
+    hapi_spidar_solver solver;
+    double lengths[HAPI_SPIDAR_STRINGS_MAX];
+    double error[SEEN_WAYS] = {0.0};
+    error[string] = 5e-4;
+    memcpy(lengths, right_lengths, sizeof lengths);
+    lengths[string] += error[string];
+    hapi_spidar_solver_init(&solver, model, &pose);
+    while (hapi_spidar_solve(&solver, model, lengths) == HAPI_SPIDAR_FIT_MOVING) {
+    }
+    CHECK_NEAR(seen_misfit(model->motor, model->grip, &pose, error), solver.residual, 5e-6);
+  }
+  /* The grip goes on by 10 um: a pose fits. */
+  hap_pose there = pose;
+  double lengths[HAPI_SPIDAR_STRINGS_MAX];
+  double error[SEEN_WAYS];
+  there.position[1] += 1e-5;
+  hapi_spidar_lengths(model, &there, lengths);
+  for (int i = 0; i < 8; ++i) {
+    error[i] = lengths[i] - right_lengths[i];
+  }
+  CHECK(fabs(error[0]) > 1e-6);
+  CHECK(seen_misfit(model->motor, model->grip, &pose, error) < 1e-8);
 }
 
 /* ---- a pointer by itself ---- */
