@@ -269,6 +269,34 @@ TEST(what_the_observer_takes_goes_at_the_slew_bound)
   CHECK(p->guard.flags == 0 && f.tick.guard.energy_ticks == 3);
 }
 
+/* Nor more than motion explains, while the device is doubted: the way may be none. */
+TEST(what_the_observer_takes_of_a_doubted_device_goes_slowly)
+{
+  hapi_pointer *p = guarded_and_warm();
+  p->device.speed_limit = 10.0;
+  p->belief.doubt_s = 1e-3;
+  for (int i = 0; i < 30; ++i) {
+    guard_wrench(p, 15.0, 0.0, 0.0);
+  }
+  CHECK_NEAR(p->device.wrench.force[0], 15.0, 1e-9);
+  for (int i = 1; i <= 3; ++i) {
+    p->device.pose.position[0] += 1e-3;
+    guard_wrench(p, 15.0, 0.0, 0.0);
+    CHECK((p->guard.flags & HAP_GUARD_ENERGY) != 0);
+    CHECK_NEAR(p->device.wrench.force[0], 15.0 - i * LIMIT / 30.0, 1e-9);
+  }
+  p->belief.loss = 0.5; /* what doubt takes goes at once, and the rest as before */
+  guard_wrench(p, 15.0, 0.0, 0.0);
+  CHECK_NEAR(p->device.wrench.force[0], 7.5, 1e-9);
+  p->device.pose.position[0] += 1e-3;
+  guard_wrench(p, 15.0, 0.0, 0.0);
+  CHECK_NEAR(p->device.wrench.force[0], 7.5 - LIMIT / 30.0, 1e-9);
+  p->belief.doubt_s = 0.0;
+  p->device.pose.position[0] += 1e-3;
+  guard_wrench(p, 15.0, 0.0, 0.0);
+  CHECK_NEAR(p->device.wrench.force[0], 0.0, 1e-9);
+}
+
 /* ---- ramp-in, faults, reset ---- */
 
 static void check_ramp_in(hapi_pointer *p)

@@ -194,13 +194,12 @@ static void limit_unexplained(const hapi_tick_facts *facts, hapi_pointer *p)
       vector_fall(g->change.came.force, p->device.wrench.force);
       vector_fall(g->change.came.torque, p->device.wrench.torque);
     }
-    bool force = vector_slew(g->change.came.force, explained + slow * p->device.limits.max_force,
-                             p->device.wrench.force);
-    bool torque = vector_slew(
-        g->change.came.torque,
-        hapi_max(HAPI_SAFETY_HANDLE, p->shape.extent / p->device.motion_scale) * explained +
-            slow * p->device.limits.max_torque,
-        p->device.wrench.torque);
+    double arm = hapi_max(HAPI_SAFETY_HANDLE, p->shape.extent / p->device.motion_scale);
+    g->change.most_force = explained + slow * p->device.limits.max_force;
+    g->change.most_torque = arm * explained + slow * p->device.limits.max_torque;
+    bool force = vector_slew(g->change.came.force, g->change.most_force, p->device.wrench.force);
+    bool torque =
+        vector_slew(g->change.came.torque, g->change.most_torque, p->device.wrench.torque);
     g->flags |= force || torque ? HAP_GUARD_INPUT : 0;
   }
   g->change.came = p->device.wrench;
@@ -214,6 +213,15 @@ double hapi_guard_share(const hapi_guard *guard, const hapi_pointer *pointer)
   const hapi_guard_pointer *g = &pointer->guard;
   return g->share * (1.0 - guard->age_loss) * (1.0 - pointer->belief.loss) * (1.0 - g->late_loss) *
          (1.0 - g->swings.taken);
+}
+
+/* With a share that changes, what is written may change by as much more. */
+static void bound_share(hapi_guard_pointer *g, double share)
+{
+  double change = fabs(share - g->change.share);
+  g->change.most_force += change * hapi_v3_norm(g->change.came.force);
+  g->change.most_torque += change * hapi_v3_norm(g->change.came.torque);
+  g->change.share = share;
 }
 
 /* What the device shall get before the limits. */
@@ -253,6 +261,7 @@ static void pointer_want(const hapi_guard *guard, const hapi_tick_facts *facts, 
   g->flags |= p->belief.doubted || p->belief.loss > 0.0 ? HAP_GUARD_INPUT : 0;
   g->flags |= g->late_loss > 0.0 ? HAP_GUARD_LATE : 0;
   g->flags |= g->swings.taken > 0.0 ? HAP_GUARD_OSCILLATION : 0;
+  bound_share(g, share);
   wrench_scale(share, &p->device.wrench);
   if (p->declared.any) {
     wrench_scale(share, &p->declared.given);
@@ -297,6 +306,16 @@ static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
   bool force = vector_slew(g->written.force, period * force_rate, p->device.wrench.force);
   bool torque = vector_slew(g->written.torque, period * torque_rate, p->device.wrench.torque);
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
+}
+
+/* Of contacts, whatever took some of it meanwhile: the ledger of energy has a way of the device that
+ * may be false. */
+static void limit_doubted(hapi_pointer *p)
+{
+  hapi_guard_pointer *g = &p->guard;
+  bool force = vector_slew(g->contact.force, g->change.most_force, p->device.wrench.force);
+  bool torque = vector_slew(g->contact.torque, g->change.most_torque, p->device.wrench.torque);
+  g->flags |= force || torque ? HAP_GUARD_INPUT : 0;
 }
 
 static void report_declared(hapi_pointer *p)
@@ -363,6 +382,10 @@ void hapi_guard_write(hapi_guard *guard, double period, const hapi_pointers *poi
     hapi_pointer *p = &pointers->of[i];
     if (p->generation == 0) {
       continue;
+    }
+    if (guard->mode == HAP_GUARD_ON && guard->latch.fault == HAP_FAULT_NONE &&
+        p->belief.doubt_s > 0.0) {
+      limit_doubted(p);
     }
     if (p->declared.any) {
       hapi_wrench_add(&p->device.wrench, &p->declared.given);

@@ -220,7 +220,10 @@ typedef struct hapi_change_bound {
   bool doubted;             /* the device */
   hapi_explained explained; /* of this tick, and of the one before: */
   hapi_explained before;
-  hap_wrench came; /* of what is wanted: what the bound has let in */
+  hap_wrench came;   /* of what is wanted: what the bound has let in */
+  double share;      /* 0..1, of it that ramps, age and doubt left */
+  double most_force; /* N, N m: by which the force of a doubted device may change */
+  double most_torque;
 } hapi_change_bound;
 
 /* What the guard keeps of a pointer. Device frame and units where nothing else is said; zeroed: a
