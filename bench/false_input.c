@@ -490,6 +490,18 @@ static hap_status pointer_add(stage *s, hap_detail *detail)
   return status;
 }
 
+/* N. A device that tells seldom may come back so far away as a hand goes in the meantime: then its
+ * place is believed, and the force there is right. */
+static double spring_presses(const stage *s)
+{
+  double deepest = FACE;
+  uint64_t kept = (uint64_t)(2.0 * HOLD_S * s->def->haptic_hz);
+  for (uint64_t i = 1; s->def->device == FALSE_INPUT_COARSE && i <= kept && i <= s->reads; ++i) {
+    deepest = fmax(deepest, s->told[(s->reads - i) % OLD_MAX].position[0]);
+  }
+  return s->def->stiffness * (deepest - FACE);
+}
+
 static hap_status run_measure(stage *s, false_input_run *out, hap_detail *detail)
 {
   hap_status status = HAP_OK;
@@ -505,6 +517,7 @@ static hap_status run_measure(stage *s, false_input_run *out, hap_detail *detail
     if (status >= HAP_OK) {
       double since = (i + 1) / s->def->haptic_hz - FALSE_INPUT_BEGIN_S;
       hapi_v3_copy(state.wrench.force, out->force[i]);
+      out->pressed[i] = spring_presses(s);
       if (stats.faults.fault != HAP_FAULT_NONE && out->fault_s < 0.0) {
         hap_detail why = {""};
         (void)hap_session_detail(s->session, &why);
@@ -573,4 +586,9 @@ void false_input_compare(const false_input_def *def, const false_input_run *righ
 {
   run_extremes(def, right, &out->peak_right, &out->step_right);
   run_extremes(def, run, &out->peak, &out->step);
+  out->share = 0.0;
+  for (int i = (int)(FALSE_INPUT_BEGIN_S * def->haptic_hz); i < run->ticks; ++i) {
+    out->share =
+        fmax(out->share, hapi_v3_norm(run->force[i]) / fmax(out->peak_right, run->pressed[i]));
+  }
 }

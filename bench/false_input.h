@@ -53,6 +53,8 @@ typedef struct false_input_def {
 typedef struct false_input_run {
   int ticks;
   double force[FALSE_INPUT_TICKS_MAX][3]; /* N, on the hand */
+  double pressed[FALSE_INPUT_TICKS_MAX];  /* N, of the spring at the place where the hand really is,
+                                             or was in the last 8 ms; 0: the device tells often */
   uint32_t fault;                         /* hap_fault that latched */
   double fault_s;                         /* from FALSE_INPUT_BEGIN_S; < 0: none */
   double told_s;                          /* when a flag of the guard said so first; < 0: never */
@@ -65,6 +67,7 @@ typedef struct false_input_run {
 typedef struct false_input_figures {
   double peak;       /* N, largest force from FALSE_INPUT_BEGIN_S on */
   double peak_right; /* N, the same undisturbed */
+  double share;      /* largest force over what is right: peak_right, or what the hand presses */
   double step;       /* N, largest change in 2 ms */
   double step_right;
 } false_input_figures;

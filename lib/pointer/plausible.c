@@ -184,15 +184,26 @@ static bool follow_elsewhere(hapi_pointer *p, double seconds, int64_t now_ns)
   return true;
 }
 
-/* The line goes on from here. */
-static void line_take(hapi_pointer *p, int64_t now_ns)
+/* A pose that is believed. The share of time decides between two places that are told in turn: a
+ * false pose that agrees with the line for a moment does not make the others begin anew. */
+static void elsewhere_fade(hapi_elsewhere *e, double seconds)
+{
+  e->since += seconds;
+  e->seconds -= seconds;
+  if (e->seconds <= 0.0) {
+    *e = (hapi_elsewhere){.known = false};
+  }
+}
+
+/* The line goes on from here; leapt: from where the poses went elsewhere. */
+static void line_take(hapi_pointer *p, int64_t now_ns, bool leapt)
 {
   hapi_pointer_belief *b = &p->belief;
   double passed = seconds_between(b->line_ns, now_ns);
   double way[3];
   hapi_v3_sub(p->device.pose.position, b->line.position, way);
   hapi_v3_copy(b->velocity, b->velocity_before);
-  if (b->elsewhere.known) {
+  if (leapt) {
     hapi_v3_copy(b->elsewhere.velocity, b->velocity);
     b->off = HAPI_SAFETY_SWING_LIMIT * HAPI_SAFETY_GAP_MOST_S * HAPI_SAFETY_GAP_MOST_S;
   } else if (passed > 0.0) {
@@ -210,17 +221,17 @@ static void line_take(hapi_pointer *p, int64_t now_ns)
 
 /* At a new place, which the device told after so long. The line is made of poses that are not too
  * near in time: else its velocity would be noise, and the bound another one at each rate. */
-static void sample_take(hapi_pointer *p, int64_t now_ns)
+static void sample_take(hapi_pointer *p, int64_t now_ns, bool leapt)
 {
   hapi_pointer_belief *b = &p->belief;
   double step[3];
   hapi_v3_sub(p->device.pose.position, b->told.position, step);
   double least = hapi_max(HAPI_SAFETY_QUANTA * p->velocity.quantum, HAPI_SAFETY_STEP_LEAST);
-  if (!b->elsewhere.known && hapi_v3_norm(step) > least) {
+  if (!leapt && hapi_v3_norm(step) > least) {
     gap_note(b, seconds_between(b->sample_ns, now_ns));
   }
-  if (b->elsewhere.known || seconds_between(b->line_ns, now_ns) > 0.5 * HAPI_SAFETY_JUDGE_S) {
-    line_take(p, now_ns);
+  if (leapt || seconds_between(b->line_ns, now_ns) > 0.5 * HAPI_SAFETY_JUDGE_S) {
+    line_take(p, now_ns, leapt);
   }
   b->told = p->device.pose;
   b->sample_ns = now_ns;
@@ -290,7 +301,8 @@ static void late_take(hapi_pointer *p, int64_t now_ns, double tick)
     return;
   }
   double way = off_way(b->line.position, b->velocity, passed, p->device.pose.position, off);
-  double most = HIT_MOST + HAPI_SAFETY_QUANTA * p->velocity.quantum;
+  double share = hapi_min(tick / HAPI_SAFETY_JUDGE_S, 1.0); /* later ticks bring the rest */
+  double most = share * HIT_MOST + HAPI_SAFETY_QUANTA * p->velocity.quantum;
   if (way > most) {
     hapi_v3_madd(b->late, 1.0 - most / way, off, b->late);
   }
@@ -333,23 +345,24 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
   }
   bool news = is_news(p);
   bool believed = !news || pose_is_plausible(p, now_ns);
+  bool leapt = false;
   if (!believed) {
-    believed = follow_elsewhere(p, seconds, now_ns);
-    b->jumped = believed && is_far(p);
+    believed = leapt = follow_elsewhere(p, seconds, now_ns);
+    b->jumped = leapt && is_far(p);
   } else {
-    b->elsewhere.known = false;
+    elsewhere_fade(&b->elsewhere, seconds);
   }
   double stood = seconds_between(b->sample_ns, now_ns);
   b->paced = b->paced || stood > HAPI_SAFETY_GAP_MOST_S;
   late_follow(b, seconds);
   if (believed && news) {
     late_take(p, now_ns, seconds);
-    sample_take(p, now_ns);
+    sample_take(p, now_ns, leapt);
   } else if (believed && stood > HAPI_SAFETY_REST_GAPS * gap_or_tick(b)) {
     rest_take(b);
   }
   if (believed) {
-    b->elsewhere.known = false;
+    b->elsewhere.known = b->elsewhere.known && !leapt;
     b->believe_ns = now_ns;
   } else {
     pose_carry(p, now_ns);
