@@ -308,8 +308,8 @@ static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
 }
 
-/* Of contacts, whatever took some of it meanwhile: the ledger of energy has a way of the device that
- * may be false. */
+/* Of contacts, whatever took some of it meanwhile: the ledger of energy has a way of the device
+ * that may be false. */
 static void limit_doubted(hapi_pointer *p)
 {
   hapi_guard_pointer *g = &p->guard;
