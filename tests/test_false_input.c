@@ -623,6 +623,33 @@ TEST(each_string_that_leaves_its_length_is_left_out)
   }
 }
 
+/* Of a frame of half a metre, after 50 ms without a reply: what a string may have gone by then says
+ * nothing any more. */
+TEST(a_grip_that_is_elsewhere_after_a_silence_is_doubted)
+{
+  for (int far = 0; far < 2; ++far) {
+    strings *w = &wires;
+    wires_begin("x4r");
+    for (int i = 0; i < 8; ++i) {
+      hapi_v3_scale(4.0, w->model.motor[i], w->model.motor[i]);
+      hapi_v3_scale(4.0, w->model.grip[i], w->model.grip[i]);
+    }
+    hapi_v3_scale(4.0, w->model.workspace, w->model.workspace);
+    memset(w->counts, 0, sizeof w->counts);
+    hapi_spidar_calibrate_at(&w->model, NULL, w->counts);
+    hapi_spidar_belief_begin(&w->belief, &w->model, NULL);
+    for (int i = 0; i < 40; ++i) {
+      CHECK(wires_tell(0.0, 0.0, -1, 0.0) == HAPI_SPIDAR_BELIEVED);
+    }
+    w->ns += 49 * MS;
+    hapi_spidar_verdict said = HAPI_SPIDAR_DOUBTED;
+    for (int i = 0; i < 10; ++i) { /* the fit goes 6 cm a reply */
+      said = wires_tell((far != 0 ? 0.16 : 0.06) + 2e-4 * i, 0.0, -1, 0.0);
+    }
+    CHECK_SAY(said == (far != 0 ? HAPI_SPIDAR_DOUBTED : HAPI_SPIDAR_BELIEVED), "%d", (int)said);
+  }
+}
+
 /* So slowly that no reply leaves its way: the fit tells. */
 TEST(a_string_that_creeps_is_found_by_the_fit)
 {

@@ -5,6 +5,7 @@
 
 #include "tests/tap.h"
 
+#include "base/safety.h"
 #include "guard/force_guard.h"
 #include "tests/tick_world.h"
 #include "tick/black_box.h"
@@ -216,6 +217,21 @@ TEST(a_torque_that_no_motion_explains_comes_in_slowly)
   CHECK((p->guard.flags & HAP_GUARD_INPUT) != 0);
 }
 
+/* The force that a way explains has a grip of 5 cm as its arm. */
+TEST(a_way_explains_the_torque_of_a_grip)
+{
+  hapi_pointer *p = guarded_and_warm();
+  p->device.feels_torque = true;
+  p->device.speed_limit = 10.0;
+  f.tick.facts.model = HAP_MODEL_CONTACT;
+  guard_wrench(p, 0.0, 0.0, 0.0);
+  p->guard.change.explained = (hapi_explained){.stiffness = 1000.0};
+  p->device.pose.position[0] -= 2e-3;
+  hapi_v3_set(p->wrench.torque, 0.0, 0.0, -0.5);
+  hapi_tick_guard(&f.tick);
+  CHECK_NEAR(p->device.wrench.torque[2], -(0.05 * 1000.0 * 2e-3 + 1.0 / 30.0), 1e-9);
+}
+
 TEST(a_force_beyond_the_limit_comes_to_it_in_its_own_direction)
 {
   hapi_pointer *p = guarded_and_warm();
@@ -295,6 +311,21 @@ TEST(what_the_observer_takes_of_a_doubted_device_goes_slowly)
   p->device.pose.position[0] += 1e-3;
   guard_wrench(p, 15.0, 0.0, 0.0);
   CHECK_NEAR(p->device.wrench.force[0], 0.0, 1e-9);
+}
+
+/* After a gap a force that rises does so slowly, whatever the observer took of it. */
+TEST(a_force_that_the_observer_cut_and_that_rises_is_late_all_the_same)
+{
+  const double late = T * LIMIT / HAPI_SAFETY_LATE_SLEW_S;
+  for (int falls = 0; falls < 2; ++falls) {
+    hapi_pointer *p = guarded_and_warm();
+    f.tick.guard.late.slew_s = 0.01;
+    p->guard.flags = HAP_GUARD_ENERGY;
+    p->guard.written.force[0] = 10.0;
+    p->device.wrench.force[0] = falls != 0 ? 4.0 : 18.0;
+    hapi_guard_write(&f.tick.guard, T, &f.tick.pointers);
+    CHECK_NEAR(p->device.wrench.force[0], falls != 0 ? 4.0 : 10.0 + late, 1e-12);
+  }
 }
 
 /* ---- ramp-in, faults, reset ---- */

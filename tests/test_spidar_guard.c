@@ -59,6 +59,7 @@ static struct looks {
   atomic_int longest_ms;
   atomic_int pauses; /* between two zeros */
   atomic_llong shortest_ns;
+  atomic_int logged; /* lines to the system's log */
 } * looks;
 
 static void *real_symbol(const char *name)
@@ -151,6 +152,17 @@ int socket(int family, int type, int protocol)
   return trouble.no_sockets ? -1 : real(family, type, protocol);
 }
 
+ssize_t sendto(int fd, const void *bytes, size_t size, int flags, __CONST_SOCKADDR_ARG to,
+               socklen_t length)
+{
+  ssize_t (*real)(int, const void *, size_t, int, __CONST_SOCKADDR_ARG, socklen_t);
+  REAL(real, "sendto");
+  if (is_guard()) {
+    atomic_fetch_add(&looks->logged, fd >= 0 && memcmp(bytes, "<28>spidar-guard: ", 18) == 0);
+  }
+  return real(fd, bytes, size, flags, to, length);
+}
+
 void *mmap(void *at, size_t size, int protection, int flags, int fd, off_t offset)
 {
   void *(*real)(void *, size_t, int, int, int, off_t);
@@ -207,6 +219,7 @@ typedef struct rig {
   int port;
   int board; /* the other end of the port */
   uint8_t zeros[ZEROS];
+  hapi_spidar_boards boards; /* that a port has to have; none: any */
 } rig;
 
 static void rig_end(void *self)
@@ -237,11 +250,10 @@ static const hapi_spidar_identity unknown = {.usb = false};
 static bool rig_start_as(rig *r, const char *path, const hapi_spidar_identity *identity,
                          double stall_s)
 {
-  static const hapi_spidar_boards boards = {.count = 0};
   const hapi_spidar_guard_def def = {.port = r->port,
                                      .path = path,
                                      .identity = identity,
-                                     .boards = &boards,
+                                     .boards = &r->boards,
                                      .zeros = r->zeros,
                                      .zero_count = ZEROS,
                                      .stall_s = stall_s};
@@ -584,9 +596,10 @@ static terminal *terminal_new(void)
 }
 
 /* Its guard runs, and the port is gone. */
-static rig *rig_lost(const char *path, const hapi_spidar_identity *identity)
+static rig *rig_lost(const char *path, const hapi_spidar_identity *identity, int boards)
 {
   rig *r = rig_new();
+  r->boards = (hapi_spidar_boards){.count = boards, .id = {0}, .model = {5}};
   REQUIRE(rig_start_as(r, path, identity, STALL_S));
   REQUIRE(guard_await(r) > 0);
   close(r->board);
@@ -612,7 +625,7 @@ TEST(a_port_that_comes_back_is_zeroed_and_that_is_said)
   int before = dup(STDERR_FILENO);
   int errors = open(own->name, O_RDWR | O_NOCTTY | O_CLOEXEC);
   REQUIRE(before >= 0 && errors >= 0 && dup2(errors, STDERR_FILENO) >= 0);
-  rig *r = rig_lost(path, &unknown);
+  rig *r = rig_lost(path, &unknown, 0);
   dup2(before, STDERR_FILENO);
   close(before);
   close(errors);
@@ -630,6 +643,44 @@ TEST(a_port_that_comes_back_is_zeroed_and_that_is_said)
   CHECK_SAY(strstr(said, "spidar-guard: ") == said && strstr(said, path) != NULL &&
                 strstr(said, "came back") != NULL,
             "%s", said);
+  CHECK(atomic_load(&looks->logged) == 1);
+  REQUIRE(unlink(path) == 0);
+}
+
+/* Reads until the guard has asked for the board of id 0. */
+static bool question_await(int board)
+{
+  struct pollfd ready = {board, POLLIN, 0};
+  uint8_t byte = 0;
+  while (byte != hapi_spidar_header(HAPI_SPIDAR_BOARD_INFO, 0)) {
+    if (poll(&ready, 1, PATIENCE_MS) <= 0 || read(board, &byte, 1) != 1) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* Boards that do not answer are asked again. Others get nothing. */
+TEST(a_port_whose_boards_are_silent_is_asked_again)
+{
+  static const uint8_t other[7] = {1 << 3, 7, 12, 8, 0, 4, 0}; /* B5M */
+  const char *path = folder_path("silent");
+  terminal *t = terminal_new();
+  int kept = open(t->name, O_RDWR | O_NOCTTY | O_CLOEXEC); /* else its end is a hang-up */
+  REQUIRE(kept >= 0);
+  rig *r = rig_lost(path, &unknown, 1);
+  atomic_store(&looks->logged, 0);
+  REQUIRE(symlink(t->name, path) == 0);
+  for (int i = 0; i < 6; ++i) { /* it tries three times each */
+    CHECK(question_await(t->board));
+    CHECK(atomic_load(&looks->logged) == 0);
+  }
+  while (atomic_load(&looks->logged) == 0 && question_await(t->board)) {
+    CHECK(write(t->board, other, sizeof other) == (ssize_t)sizeof other);
+    hapi_clock_sleep_until(hapi_clock_now() + 200000000);
+  }
+  CHECK(atomic_load(&looks->logged) == 1 && !atomic_load(&r->guard.pulse->rescued));
+  close(kept);
   REQUIRE(unlink(path) == 0);
 }
 
@@ -650,7 +701,7 @@ TEST(an_adapter_that_is_in_again_is_zeroed_without_a_question)
   snprintf(trouble.sysfs, sizeof trouble.sysfs, "%s", folder_path("sys"));
   snprintf(trouble.adapter, sizeof trouble.adapter, "%s", t->name);
   trouble.no_sockets = true; /* nor a log */
-  rig *r = rig_lost("/no/such/port", &adapter);
+  rig *r = rig_lost("/no/such/port", &adapter, 0);
   hapi_clock_sleep_until(hapi_clock_now() + 100000000);
   CHECK(!atomic_load(&r->guard.pulse->rescued));
   for (size_t i = 0; i < sizeof folders / sizeof folders[0]; ++i) {
@@ -668,13 +719,13 @@ TEST(an_adapter_that_is_in_again_is_zeroed_without_a_question)
 /* Ten minutes after its program, in looks of 20 ms, and no longer. */
 TEST(a_guard_that_is_alone_waits_for_ten_minutes)
 {
-  rig *r = rig_lost("/no/such/port", &unknown);
+  rig *r = rig_lost("/no/such/port", &unknown, 0);
   pid_t guard = guard_await(r);
   kill(guard, SIGKILL);
   REQUIRE(guard_ends(guard));
   trouble.hurries = true;
   atomic_store(&looks->longest_ms, 0);
-  r = rig_lost("/no/such/port", &unknown);
+  r = rig_lost("/no/such/port", &unknown, 0);
   guard = guard_await(r);
   atomic_store(&looks->count, 0);
   hapi_spidar_guard_end(&r->guard, false);
