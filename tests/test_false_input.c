@@ -298,6 +298,55 @@ TEST(noise_fades_and_is_told_within_20_ms)
   CHECK(hand_x() == 0.0 && hand.belief.loss == 0.0);
 }
 
+/* About z; the place stays. */
+static bool tool_turn(double angle)
+{
+  hand.device.pose.quat_wxyz[0] = cos(0.5 * angle);
+  hand.device.pose.quat_wxyz[3] = sin(0.5 * angle);
+  return hand_tell(0.0, MS);
+}
+
+/* 50 rad/s of change; another attitude is believed when it stays, and felt as a jump. */
+TEST(the_turn_of_a_tool_is_judged_too)
+{
+  static const hapi_tool_hull hull;
+  hand_rest(1, 25 * MS);
+  hand.shape.hull = &hull;
+  CHECK(tool_turn(0.04));
+  CHECK(tool_turn(0.08));
+  CHECK(!tool_turn(0.3));
+  CHECK_NEAR(hand.device.pose.quat_wxyz[3], sin(0.04), 1e-12);
+  CHECK(tool_turn(0.12) && !hand.belief.doubted);
+  int ms = 0;
+  while (ms < 20 && !tool_turn(1.0 + 1e-3 * ms)) {
+    ++ms;
+  }
+  CHECK(ms >= 2 && ms <= 5 && hand.belief.jumped);
+  for (int i = 0; i < 60 && hand.belief.loss < 1.0; ++i) { /* to and fro: no attitude at all */
+    CHECK(!tool_turn(i % 2 == 0 ? 0.3 : -0.3));
+  }
+  CHECK(hand.belief.loss >= 1.0);
+  hand.device.three_dof = true; /* it does not turn a hull */
+  CHECK(tool_turn(0.3));
+}
+
+/* Of what is no pose or no time nothing is known. */
+TEST(what_is_no_pose_is_not_judged)
+{
+  hand_rest(1, 25 * MS);
+  hand.device.pose.quat_wxyz[1] = (double)NAN;
+  CHECK(hand_tell(0.0, MS) && !hand.belief.known);
+  hand.device.pose.quat_wxyz[1] = 0.0;
+  CHECK(hand_tell(0.0, MS) && hand_tell(1e-4, MS) && hand.belief.known);
+  CHECK(hand_tell(0.1, -5 * MS)); /* the clock went back */
+  CHECK_NEAR(hand_x(), 0.1, 0.0);
+  hand_rest(1, 25 * MS);
+  CHECK(hand_tell(1e-4, MS));
+  hand.device.twist.linear[0] = (double)INFINITY; /* is another's to refuse */
+  hapi_input_judge_twist(&hand);
+  CHECK(hand.device.twist.linear[0] > 1e300);
+}
+
 /* A velocity that the poses do not have would be felt through every damper. */
 TEST(a_twist_stays_near_that_of_the_poses)
 {
@@ -310,6 +359,22 @@ TEST(a_twist_stays_near_that_of_the_poses)
     hand.device.twist.linear[0] = -6.0;
     hapi_input_judge_twist(&hand);
     CHECK(hand.device.twist.linear[0] >= -1.3); /* 0.5 and, of a gap and a half, 0.45 less */
+  }
+}
+
+/* A velocity that the device measures may be newer than its poses; an estimate is made of them. */
+TEST(a_measured_twist_of_a_seldom_device_may_be_ahead_of_its_poses)
+{
+  for (int estimates = 0; estimates < 2; ++estimates) {
+    hand_begin();
+    hand.device.estimates = estimates != 0;
+    for (int i = 0; i <= 200; ++i) {
+      CHECK(hand_tell(2e-4 * (i - i % 4), MS));
+    }
+    hand.device.twist.linear[0] = 6.0;
+    hapi_input_judge_twist(&hand);
+    CHECK_NEAR(hand.device.twist.linear[0],
+               0.2 + 0.5 + (estimates != 0 ? 0.0 : 1.5 * 300.0 * 0.004), 1e-3);
   }
 }
 

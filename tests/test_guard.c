@@ -232,6 +232,47 @@ TEST(a_way_explains_the_torque_of_a_grip)
   CHECK_NEAR(p->device.wrench.torque[2], -(0.05 * 1000.0 * 2e-3 + 1.0 / 30.0), 1e-9);
 }
 
+/* Its corner goes 2 mm; after a jump nobody knows how far. */
+TEST(a_turn_of_a_tool_explains_the_way_of_its_corners)
+{
+  static const hapi_tool_hull hull;
+  for (int jumped = 0; jumped < 2; ++jumped) {
+    hapi_pointer *p = guarded_and_warm();
+    p->device.speed_limit = 10.0;
+    p->shape.hull = &hull;
+    p->shape.extent = 0.1;
+    f.tick.facts.model = HAP_MODEL_CONTACT;
+    guard_wrench(p, 0.0, 0.0, 0.0);
+    guard_wrench(p, 0.0, 0.0, 0.0);
+    p->guard.change.explained = (hapi_explained){.stiffness = 1000.0};
+    p->device.jumped = jumped != 0;
+    p->device.pose.quat_wxyz[3] = sin(0.5 * 0.02);
+    p->device.pose.quat_wxyz[0] = -cos(0.5 * 0.02); /* the same turn */
+    p->device.pose.quat_wxyz[3] *= -1.0;
+    guard_wrench(p, -9.0, 0.0, 0.0);
+    CHECK_NEAR(p->device.wrench.force[0], -((jumped != 0 ? 0.0 : 2.0) + LIMIT / 30.0), 1e-3);
+  }
+}
+
+/* The device is held, and its base goes on. */
+TEST(the_way_of_a_base_explains_as_that_of_the_device)
+{
+  for (int moves = 0; moves < 2; ++moves) {
+    hapi_pointer *p = guarded_and_warm();
+    p->device.speed_limit = 10.0;
+    f.tick.facts.model = HAP_MODEL_CONTACT;
+    f.tick.facts.observes = false;
+    guard_wrench(p, 0.0, 0.0, 0.0);
+    p->guard.change.explained = (hapi_explained){.stiffness = 1000.0, .damping = 4.0};
+    p->guard.change.before = p->guard.change.explained;
+    p->frame.used = moves != 0;
+    p->frame.step[0] = 2e-3;
+    p->frame.carries.linear[0] = 0.5;
+    guard_wrench(p, -9.0, 0.0, 0.0);
+    CHECK_NEAR(p->device.wrench.force[0], -((moves != 0 ? 2.0 + 2.0 : 0.0) + LIMIT / 30.0), 1e-9);
+  }
+}
+
 TEST(a_force_beyond_the_limit_comes_to_it_in_its_own_direction)
 {
   hapi_pointer *p = guarded_and_warm();
@@ -311,6 +352,16 @@ TEST(what_the_observer_takes_of_a_doubted_device_goes_slowly)
   p->device.pose.position[0] += 1e-3;
   guard_wrench(p, 15.0, 0.0, 0.0);
   CHECK_NEAR(p->device.wrench.force[0], 0.0, 1e-9);
+  p->belief.doubt_s = 1e-3;
+  p->device.feels_torque = true;
+  p->guard.contact = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.4}};
+  p->guard.written = p->guard.contact;
+  p->guard.change.most_torque = 0.01;
+  p->guard.flags = 0;
+  memset(&p->device.wrench, 0, sizeof p->device.wrench);
+  hapi_guard_write(&f.tick.guard, T, &f.tick.pointers);
+  CHECK_NEAR(p->device.wrench.torque[2], 0.39, 1e-9);
+  CHECK(p->guard.flags == HAP_GUARD_INPUT);
 }
 
 /* After a gap a force that rises does so slowly, whatever the observer took of it. */
