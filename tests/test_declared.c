@@ -8,6 +8,7 @@
 
 #include "guard/force_guard.h"
 #include "guard/oscillation.h"
+#include "guard/promise.h"
 #include "tests/tick_world.h"
 
 #define LIMIT 20.0 /* N */
@@ -155,4 +156,37 @@ TEST(a_spring_that_is_declared_is_found_to_swing_as_contacts_are)
     hapi_tick_guard(&f.tick);
   }
   CHECK(f.tick.guard.latch.fault == HAP_FAULT_OSCILLATION);
+}
+
+/* ---- promises, by themselves ---- */
+
+/* 0 of everything: no force is left, whatever the hand does. */
+TEST(who_promises_nothing_gives_nothing)
+{
+  const hapi_promise none = {0.0, 0.0, 0.0};
+  hapi_declared way = {.way = {1e-3, 0.0, 0.0}, .turn = {0.0, 0.0, 0.01}};
+  hap_wrench w = {{5.0, -3.0, 1.0}, {0.1, 0.0, 0.2}};
+  hapi_purse purse;
+  hapi_purse_fill(&purse, &none);
+  CHECK(hapi_promise_keep(&none, &purse, &way, T, &w));
+  CHECK(hapi_v3_norm(w.force) == 0.0 && hapi_v3_norm(w.torque) == 0.0);
+  purse.last.force[0] = 2.0; /* of a promise before: what it gave is a debt */
+  hapi_v3_set(w.force, 5.0, 0.0, 0.0);
+  CHECK(hapi_promise_keep(&none, &purse, &way, T, &w) && purse.joules <= 0.0);
+  CHECK(hapi_v3_norm(w.force) == 0.0);
+}
+
+/* Without power a torque may hold the hand, and not turn it; each flow has its own sign. */
+TEST(a_torque_without_power_only_brakes)
+{
+  const hapi_promise brake = {10.0, 1.0, 0.0};
+  for (int drives = 0; drives < 2; ++drives) {
+    hapi_declared way = {.turn = {0.0, 0.0, drives != 0 ? 0.01 : -0.01}};
+    hap_wrench w = {{4.0, 0.0, 0.0}, {0.0, 0.0, 0.5}};
+    hapi_purse purse;
+    hapi_purse_fill(&purse, &brake);
+    CHECK(hapi_promise_keep(&brake, &purse, &way, T, &w) == (drives != 0));
+    CHECK_NEAR(w.torque[2], drives != 0 ? 0.0 : 0.5, 1e-12);
+    CHECK_NEAR(w.force[0], 4.0, 0.0); /* it stands still: nothing flows */
+  }
 }
