@@ -25,6 +25,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "own_device": "docs/writing-a-device.md",
     "own_forces": "docs/forces.md",
     "sandpaper_and_ice": "docs/surfaces.md",
+    "tap_materials": "docs/surfaces.md",
     "push_without_ode": "docs/scene.md",
     "grip_and_feel": "docs/grippers.md",
     "two_fingers": "docs/fingers.md",
@@ -160,6 +161,17 @@ def check_sandpaper_and_ice(program):
     point(rubs["sandpaper"] > 10 * rubs["ice"] > 10 * rubs["foam"], "sandpaper rubs", str(rubs))
     last = float(rows[-1][1]) if rows else 0.0
     point(0.5 < last < 1.0, "foam is soft", f"{last} N")
+
+
+def check_tap_materials(program):
+    rows = rows_of(run(program), r"^ *(\d+) ms (\w+) +presses with +(-?[0-9.]+) N, "
+                                 r"rings with +(-?[0-9.]+) N +\*$")
+    turns = {}
+    for name in ("rubber", "wood", "metal"):
+        force = [float(f) for _, n, _, f in rows if n == name]
+        turns[name] = sum(a * b < 0.0 for a, b in zip(force, force[1:]))
+    point(turns["metal"] > turns["wood"] > turns["rubber"] > 0, "metal rings longest", str(turns))
+    point(max(abs(float(f)) for _, _, _, f in rows) < 5.0, "no more than 5 N")
 
 
 def check_own_forces(program):

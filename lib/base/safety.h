@@ -70,6 +70,7 @@
 #define HAPI_SAFETY_CONTACT_SPEED 0.2       /* m/s */
 #define HAPI_SAFETY_CONTACT_PRESS_MOST 10.0 /* m/s */
 #define HAPI_SAFETY_TEXTURE_HEIGHT 0.003    /* m */
+#define HAPI_SAFETY_IMPACT_FORCE 5.0        /* N */
 
 /* ---- energy ---- */
 #define HAPI_SAFETY_OVERDRAFT 0.006      /* 1 */

@@ -45,7 +45,7 @@ static void texture_follow(hapi_pair_feel *pair, double period)
 static void pair_follow(hapi_pair_feel *pair, const hapi_tick_facts *facts, const hapi_pointer *p)
 {
   if (pair->tick != facts->tick || pair->stiffness < 0.0) {
-    pair->pressed = pair->presses;
+    pair->pressed = pair->presses && pair->tick + 1 == facts->tick;
     pair->presses = false;
     pair->tick = facts->tick;
     stiffness_follow(pair, p, facts->period);
@@ -60,6 +60,39 @@ static bool contact_slid(const hapi_touches *touches, const hapi_tick_facts *fac
   const hapi_friction *f = hapi_friction_of(touches, c);
   bool there = f->generation == c->generation && f->tick + 1 == facts->tick;
   return c->feel.rubs && there && (f->rigid ? f->slid : f->left < 1.0);
+}
+
+/* m/s, of the pointer and the surface towards each other; below 0: apart. */
+static double closing_speed(const hapi_feel_place *at)
+{
+  const hapi_pointer *p = at->pointer;
+  double relative[3];
+  double arm[3];
+  double swing[3];
+  hapi_v3_copy(p->proxied ? p->proxy.velocity : p->twist.linear, relative);
+  if (p->shape.hull != NULL) {
+    hapi_v3_sub(at->point, p->pose.position, arm);
+    hapi_v3_cross(p->proxied ? p->proxy.spin : p->twist.angular, arm, swing);
+    hapi_v3_add(relative, swing, relative);
+  }
+  if (at->body != NULL) {
+    hapi_v3_sub(at->point, at->body->pose.position, arm);
+    hapi_v3_cross(at->body->twist.angular, arm, swing);
+    hapi_v3_add(swing, at->body->twist.linear, swing);
+    hapi_v3_sub(relative, swing, relative);
+  }
+  return -hapi_v3_dot(relative, at->normal);
+}
+
+/* A material answers the touch that begins; others of the pair in this tick are the same one. */
+static void material_answer(const hapi_pair_feel *pair, const hapi_feel_place *at, double depth,
+                            double period)
+{
+  const hapi_feel *said = &pair->in.feel;
+  double speed = closing_speed(at);
+  if ((said->more & HAPI_FEEL_IMPACT) != 0 && speed > 0.0) {
+    hapi_transient_begin(&at->pointer->transients, &said->impact, speed, depth, at->normal, period);
+  }
 }
 
 /* A touch of a textured surface, in the frame of the geom's body. */
@@ -173,5 +206,8 @@ void hapi_touch_feel_follow(hapi_touches *touches, const hapi_tick_facts *facts,
     c->feel.turned += fabs(c->feel.push[i] - before.push[i]);
   }
   *io_depth += c->feel.lift;
+  if (*io_depth > 0.0 && !pair->pressed && !pair->presses) {
+    material_answer(pair, at, *io_depth, facts->period);
+  }
   pair->presses = pair->presses || *io_depth > 0.0;
 }

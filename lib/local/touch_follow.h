@@ -11,7 +11,7 @@
 
 /* Where a contact is in this tick. */
 typedef struct hapi_feel_place {
-  const hapi_pointer *pointer;
+  hapi_pointer *pointer;
   const hapi_local_body *body; /* NULL: static world */
   const double *normal;        /* unit, world */
   const double *point;         /* world, on the surface or in it */

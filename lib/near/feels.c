@@ -18,6 +18,11 @@
 #define FRICTION_MOST 10.0 /* as between bodies */
 #define STIFFNESS_MOST 1e9 /* as of hap_pointer_def */
 #define DAMPING_MOST 1e6
+#define IMPACT_MOST 1000.0 /* N s/m */
+#define IMPACT_DECAY_LEAST 10.0
+#define IMPACT_DECAY_MOST 10000.0 /* 1/s */
+#define IMPACT_HZ_LEAST 5.0
+#define IMPACT_HZ_MOST 1000.0
 
 void hapi_feels_finish(hapi_feels *feels)
 {
@@ -53,6 +58,14 @@ static bool surface_is_good(const hap_surface *s, const hapi_texture *texture)
          number_is_good(s->friction_dynamic, DBL_MAX);
 }
 
+static bool impact_is_good(const hap_surface *s, double haptic_hz)
+{
+  return s->impact_force == 0.0 || /* then the others do not count */
+         (number_is_good(s->impact_force, IMPACT_MOST) && s->impact_decay >= IMPACT_DECAY_LEAST &&
+          s->impact_decay <= IMPACT_DECAY_MOST && s->impact_hz >= IMPACT_HZ_LEAST &&
+          s->impact_hz <= fmin(IMPACT_HZ_MOST, 0.25 * haptic_hz));
+}
+
 /* As the pointer has it of its own. */
 static void surface_begin(const hapi_state_pointer *pointer, hap_surface *out)
 {
@@ -62,6 +75,8 @@ static void surface_begin(const hapi_state_pointer *pointer, hap_surface *out)
   out->stiffness = pointer->stiffness;
   out->damping = pointer->damping;
   out->friction_static = out->friction_dynamic = pointer->friction;
+  out->impact_decay = 80.0;
+  out->impact_hz = 100.0;
 }
 
 static const hapi_texture *texture_of(const hapi_nearby *nearby, uint32_t number)
@@ -81,6 +96,10 @@ static void feel_read(const hap_surface *s, const hapi_state_pointer *pointer, h
     out->stiffness = s->stiffness;
     out->damping = s->damping;
   }
+  if (s->impact_force > 0.0) {
+    out->more |= HAPI_FEEL_IMPACT;
+    out->impact = (hapi_impact){s->impact_force, s->impact_decay, s->impact_hz};
+  }
 }
 
 /* False: the answer was not good. */
@@ -93,12 +112,12 @@ static bool feel_ask(const hapi_nearby *nearby, uint32_t index, dGeomID geom, ha
   surface_begin(pointer, &surface);
   ode->pointer_surface(ode->user, id, geom, &surface);
   const hapi_texture *texture = texture_of(nearby, surface.texture);
-  if (!surface_is_good(&surface, texture)) {
+  if (!surface_is_good(&surface, texture) ||
+      !impact_is_good(&surface, nearby->cycle->config->haptic_hz)) {
     nearby->cycle->config->report(
         nearby->cycle->config->user, HAP_FAULT_WORLD,
-        "the pointer_surface callback gave a number that is not finite, below 0 or too large, or a "
-        "texture "
-        "that there is not (hapode/surface.h): the pointer does not feel the geom");
+        "the pointer_surface callback gave a number that is not finite or out of its range, or a "
+        "texture that there is not (hapode/surface.h): the pointer does not feel the geom");
     return false;
   }
   out->touchable = surface.touchable != 0;

@@ -15,6 +15,7 @@
 
 #include "pointer/declared.h"
 #include "pointer/swings.h"
+#include "pointer/transient.h"
 #include "pointer/velocity.h"
 #include "sync/messages.h"
 
@@ -264,6 +265,7 @@ typedef struct hapi_pointer {
   hap_twist twist;
   hap_wrench wrench; /* on the hand: of contacts; after the guard with what is declared */
   hapi_declared declared;
+  hapi_transients transients;
   hapi_pointer_shape shape;
   hapi_pointer_surface surface;
   hapi_pointer_device device;

@@ -15,8 +15,16 @@
 enum {
   HAPI_FEEL_SPRING = 1, /* stiffness and damping */
   HAPI_FEEL_STATIC = 2, /* what sticks holds more than what slides */
-  HAPI_FEEL_TEXTURE = 4
+  HAPI_FEEL_TEXTURE = 4,
+  HAPI_FEEL_IMPACT = 8
 };
+
+/* pointer/transient.h */
+typedef struct hapi_impact {
+  double force; /* N s/m */
+  double decay; /* 1/s */
+  double hz;
+} hapi_impact;
 
 typedef struct hapi_feel {
   uint32_t more; /* HAPI_FEEL_* */
@@ -26,6 +34,7 @@ typedef struct hapi_feel {
   double stiffness;            /* N/m; SPRING */
   double damping;              /* N s/m; SPRING */
   const hapi_texture *texture; /* NULL: smooth */
+  hapi_impact impact;          /* IMPACT */
   hap_pose geom;               /* of its frame in that of its body; TEXTURE */
 } hapi_feel;
 

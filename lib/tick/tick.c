@@ -186,6 +186,22 @@ static void own_forces(hapi_tick *tick)
   }
 }
 
+/* After the touches: a vibration begins in the tick of its touch. */
+static void transients_declare(hapi_tick *tick)
+{
+  for (uint32_t i = 0; i < tick->pointers.high; ++i) {
+    hapi_pointer *p = &tick->pointers.of[i];
+    if (!p->transients.any) {
+      continue;
+    }
+    if (tick->facts.faulted || p->generation == 0) {
+      memset(&p->transients, 0, sizeof p->transients);
+    } else {
+      hapi_transients_declare(&p->transients, &p->declared);
+    }
+  }
+}
+
 void hapi_tick_answer(hapi_tick *tick)
 {
   tick->facts.faulted = tick->guard.latch.fault != HAP_FAULT_NONE;
@@ -201,6 +217,7 @@ void hapi_tick_answer(hapi_tick *tick)
     hapi_tick_fault(tick, HAP_FAULT_FORCE, tick->touches.unsound);
     tick->touches.unsound = 0;
   }
+  transients_declare(tick);
   hapi_tick_guard(tick);
   if (tick->hashing) {
     tick->hash = hapi_tick_hash(tick, tick->hash);
