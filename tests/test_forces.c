@@ -588,10 +588,10 @@ TEST(places_ids_and_wrong_calls)
   hand_lead(d);
   desk_wait(d, 30); /* another pointer has none of them */
   check_vector(state_of(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
-  for (int kind = 1; kind <= 7; ++kind) {
+  for (int kind = 1; kind <= 8; ++kind) {
     CHECK(hap_force_kind_name((hap_force_kind)kind) != NULL);
   }
-  CHECK(hap_force_kind_name((hap_force_kind)8) == NULL);
+  CHECK(hap_force_kind_name((hap_force_kind)9) == NULL);
 }
 
 TEST(waves_that_are_replaced_give_their_memory_back)

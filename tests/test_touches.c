@@ -581,6 +581,7 @@ TEST(structs_of_other_builds_and_wrong_calls_are_met)
   for (int kind = HAP_EVENT_TOUCH; kind <= HAP_EVENT_FAULT; ++kind) {
     CHECK(hap_event_name((hap_event_kind)kind) != NULL);
   }
+  CHECK(hap_event_name(HAP_EVENT_FORCE_OUT) != NULL);
   CHECK(hap_event_name((hap_event_kind)0) == NULL && hap_event_name((hap_event_kind)8) == NULL);
 }
 

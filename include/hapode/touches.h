@@ -87,17 +87,19 @@ typedef enum hap_event_kind {
   /* The first blow of a touch that closed at 0.02 m/s or more: pointer and geom do not come nearer
    * any more, or 20 ms are over */
   HAP_EVENT_IMPACT = 5,
-  HAP_EVENT_BUTTON = 6, /* pressed or let go */
-  HAP_EVENT_FAULT = 7,  /* the guard has taken the force away */
+  HAP_EVENT_BUTTON = 6,    /* pressed or let go */
+  HAP_EVENT_FAULT = 7,     /* the guard has taken the force away */
   /* A gripper has closed or opened: see hap_pointer_outputs.gripper_closed. It begins open. */
-  HAP_EVENT_GRIPPER = 8
+  HAP_EVENT_GRIPPER = 8,
+  HAP_EVENT_FORCE_OUT = 10 /* the call of an own force was taken out (forces.h) */
 } hap_event_kind;
 
 /* Something that has happened. Its size goes with the call; it may grow at its end. What a kind
  * does not have is 0. */
 typedef struct hap_event {
   uint32_t kind;          /* hap_event_kind */
-  uint32_t number;        /* BUTTON, GRIPPER (its axis): from 0; FAULT: hap_fault */
+  /* BUTTON, GRIPPER (its axis): from 0; FAULT: hap_fault; FORCE_OUT: hap_force_out */
+  uint32_t number;
   int64_t time_ns;        /* of the tick, on the clock of hap_session_now */
   hap_pointer_id pointer; /* FAULT: v is 0 where it came from none */
   void *geom;             /* as in hap_touch; NULL for BUTTON, FAULT and GRIPPER */
@@ -110,6 +112,7 @@ typedef struct hap_event {
   double impulse;   /* N s, along the normal. IMPACT: of the blow; RELEASE: of the whole touch */
   uint32_t is_down; /* BUTTON: 1 pressed, 0 let go; GRIPPER: 1 closed, 0 open */
   uint32_t reserved;
+  uint64_t force; /* FORCE_OUT: hap_force_id.v */
 } hap_event;
 
 /* [any, one after the other] Takes what happened since the last call, oldest first, up to capacity.

@@ -44,4 +44,10 @@ typedef struct hapi_force_setup {
   double max_power;
 } hapi_force_setup;
 
+/* The v of its hap_force_id; place: among the pointer's forces. */
+static inline uint64_t hapi_own_force_id(uint32_t serial, uint32_t place)
+{
+  return (uint64_t)serial << 8 | (place + 1);
+}
+
 #endif

@@ -15,6 +15,7 @@ typedef enum hapi_phase {
   HAPI_PHASE_TICK = 2,  /* computes */
   HAPI_PHASE_READ = 3,  /* in a device's read */
   HAPI_PHASE_WRITE = 4, /* in a device's write */
+  HAPI_PHASE_CALL = 5,  /* in the call of an own force */
   HAPI_PHASE_MASK = 7
 } hapi_phase;
 

@@ -86,6 +86,9 @@
 #define HAPI_SAFETY_AXIS_DRIVE 2.0  /* 1/s */
 #define HAPI_SAFETY_OWN_MASS 0.05   /* kg */
 #define HAPI_SAFETY_OWN_DAMPING 0.5 /* 1 */
+#define HAPI_SAFETY_CALL_SHARE 0.1  /* 1 */
+#define HAPI_SAFETY_CALL_LATE 2.5   /* 1 */
+#define HAPI_SAFETY_CALL_FORGET 0.5 /* 1/s */
 
 /* ---- a device that swings by itself, or runs away ---- */
 #define HAPI_SAFETY_SWING_LARGE 0.2      /* 1 */

@@ -18,6 +18,7 @@
 
 #include "base/force_setup.h"
 #include "base/pointer_setup.h"
+#include "haptic/own_list.h"
 #include "record/tape.h"
 #include "sync/exchange.h"
 
@@ -98,10 +99,12 @@ hap_status hapi_haptic_pointer_poses(hapi_haptic *haptic, hap_pointer_id id, int
 /* [any] forces.h. io: v 0: it is added, and its id comes back. HAP_SATURATED: something was cut to
  * what the device can hold. */
 hap_status hapi_haptic_put_force(hapi_haptic *haptic, hap_pointer_id id, hap_force_id *io,
-                                 const hapi_force_setup *setup, const float *samples,
+                                 const hapi_force_setup *setup, const hapi_own_extra *extra,
                                  hap_detail *detail);
 hap_status hapi_haptic_remove_force(hapi_haptic *haptic, hap_pointer_id id, hap_force_id force,
                                     hap_detail *detail);
+hap_status hapi_haptic_get_force(hapi_haptic *haptic, hap_pointer_id id, hap_force_id force,
+                                 hap_force_state *out);
 
 /* [any] touches.h: what was written, and HAP_STALE when nobody had asked before. */
 hap_status hapi_haptic_touches(hapi_haptic *haptic, hap_pointer_id id, hap_touch *touches,

@@ -18,6 +18,7 @@
 #include "device/watchdog.h"
 #include "haptic/haptic.h"
 #include "haptic/outputs_box.h"
+#include "haptic/own_hands.h"
 #include "haptic/own_list.h"
 #include "haptic/settings_box.h"
 #include "record/tape.h"
@@ -158,6 +159,7 @@ typedef struct hapi_told_things {
   hapi_told_list of_bodies;
   hap_touch *touches;         /* HAP_TOUCHES_MAX for each place of each pointer's buffer */
   hap_body_contact *contacts; /* likewise capacity.contacts for each place */
+  hapi_own_hands hands;
 } hapi_told_things;
 
 /* What watchdogs see of the loop and tell it. */

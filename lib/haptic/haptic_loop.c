@@ -10,6 +10,7 @@
 #include "base/vec.h"
 #include "device/emergency.h"
 #include "guard/force_guard.h"
+#include "haptic/own_call.h"
 #include "haptic/own_forces.h"
 #include "haptic/tick_memory.h"
 #include "tick/report.h"
@@ -144,6 +145,7 @@ static void state_report(hapi_haptic *haptic)
   state->work = haptic->time.work;
   state->derated = haptic->tick.guard.late.derated_ticks > 0;
   state->swings = haptic->tick.guard.oscillation_ticks > 0;
+  state->force_out = haptic->told.hands.out;
   state->unsolved = haptic->tick.rows.unsolved_most;
   hapi_exchange_state_publish(haptic->config.exchange);
 }
@@ -368,7 +370,11 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   hapi_pointers_read(haptic, now_ns);
   standstill_follow(haptic);
   hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_TICK, 0);
-  hapi_tick_run(&haptic->tick, now_ns);
+  hapi_tick_read(&haptic->tick, now_ns);
+  if (haptic->told.hands.any) {
+    hapi_own_call_all(haptic);
+  }
+  hapi_tick_answer(&haptic->tick);
   hapi_pointers_write(haptic);
   hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_TICK, 0);
   if (haptic->tape != NULL) {

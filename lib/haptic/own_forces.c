@@ -14,6 +14,20 @@ static hapi_own_force *own_of(hapi_haptic *haptic, uint32_t index)
   return &haptic->tick.own[(size_t)index * HAP_FORCES_MAX];
 }
 
+static void caller_begin(hapi_haptic *haptic, hapi_own_caller *caller, const hapi_own_call *call,
+                         uint32_t number)
+{
+  haptic->told.hands.any = haptic->told.hands.any || call->call != NULL;
+  caller->of = *call;
+  caller->strikes = 0.0;
+  atomic_store(&caller->out, HAP_FORCE_IN);
+  atomic_store(&caller->calls, 0);
+  atomic_store(&caller->late, 0);
+  atomic_store(&caller->spent_ns, 0);
+  atomic_store(&caller->most_ns, 0);
+  atomic_store(&caller->number, number);
+}
+
 /* Samples are taken one set a tick: what a tick puts on the tape has a bound. */
 static void list_take(hapi_haptic *haptic, uint32_t index, int64_t now_ns, bool *io_samples)
 {
@@ -34,6 +48,7 @@ static void list_take(hapi_haptic *haptic, uint32_t index, int64_t now_ns, bool 
     }
     *io_samples = *io_samples || setup->wave.sample_count > 0;
     hapi_own_force_change(&own[k], setup, message->samples[k], now_ns);
+    caller_begin(haptic, &list->callers[k], &message->calls[k], setup->number);
     hapi_tape_own(haptic, index, k, setup, message->samples[k]);
   }
   haptic->tick.pointers.of[index].own = hapi_own_forces_any(own);
@@ -54,6 +69,7 @@ static void own_play(hapi_haptic *haptic, int64_t now_ns)
     const float *before = own->samples;
     hapi_own_force_change(own, &setup, samples, now_ns);
     haptic->tick.pointers.of[index].own = hapi_own_forces_any(own_of(haptic, index));
+    haptic->told.hands.any = haptic->told.hands.any || setup.kind == HAP_FORCE_CALL;
     if (before != NULL) {
       hapi_own_list_give_back(&haptic->slots[index].own, before);
     }
@@ -79,5 +95,6 @@ void hapi_own_follow(hapi_haptic *haptic, int64_t now_ns)
 void hapi_own_begin(hapi_haptic *haptic, uint32_t index)
 {
   memset(own_of(haptic, index), 0, HAP_FORCES_MAX * sizeof(hapi_own_force));
+  memset(haptic->slots[index].own.callers, 0, sizeof haptic->slots[index].own.callers);
   haptic->slots[index].own.partly = true;
 }

@@ -94,13 +94,18 @@ static void list_publish(hapi_own_list *list)
   hapi_triple_publish(&list->buffer);
 }
 
-/* Place of a force; HAP_FORCES_MAX: it is not there. */
-static uint32_t force_place(const hapi_own_list *list, hap_force_id force)
+uint32_t hapi_own_list_place(const hapi_own_list *list, hap_force_id force)
 {
   uint32_t place = (uint32_t)(force.v & 0xffu) - 1;
   bool known = place < HAP_FORCES_MAX && force.v >> 8 != 0 &&
                list->wanted.setups[place].serial == force.v >> 8;
   return known ? place : HAP_FORCES_MAX;
+}
+
+bool hapi_own_list_calls(const hapi_own_list *list, hap_force_id force)
+{
+  uint32_t place = hapi_own_list_place(list, force);
+  return place < HAP_FORCES_MAX && list->wanted.calls[place].call != NULL;
 }
 
 static uint32_t free_place(const hapi_own_list *list)
@@ -113,10 +118,10 @@ static uint32_t free_place(const hapi_own_list *list)
 }
 
 hap_status hapi_own_list_put(hapi_own_list *list, hap_force_id *io, const hapi_force_setup *setup,
-                             const float *samples)
+                             const hapi_own_extra *extra)
 {
   bool adds = io->v == 0;
-  uint32_t place = adds ? free_place(list) : force_place(list, *io);
+  uint32_t place = adds ? free_place(list) : hapi_own_list_place(list, *io);
   float *copy = NULL;
   if (place == HAP_FORCES_MAX) {
     return adds ? HAP_ERROR_CAPACITY : HAP_ERROR_NOT_FOUND;
@@ -126,7 +131,7 @@ hap_status hapi_own_list_put(hapi_own_list *list, hap_force_id *io, const hapi_f
     if (copy == NULL) {
       return HAP_ERROR_MEMORY;
     }
-    memcpy(copy, samples, setup->wave.sample_count * sizeof copy[0]);
+    memcpy(copy, extra->samples, setup->wave.sample_count * sizeof copy[0]);
   }
   if (list->wanted.samples[place] != NULL) {
     wave_leave(list, list->wanted.samples[place]);
@@ -137,14 +142,15 @@ hap_status hapi_own_list_put(hapi_own_list *list, hap_force_id *io, const hapi_f
   wanted->serial = serial;
   wanted->number = ++list->numbers;
   list->wanted.samples[place] = copy;
-  io->v = (uint64_t)serial << 8 | (place + 1);
+  list->wanted.calls[place] = extra->call;
+  io->v = hapi_own_force_id(serial, place);
   list_publish(list);
   return HAP_OK;
 }
 
 hap_status hapi_own_list_remove(hapi_own_list *list, hap_force_id force)
 {
-  uint32_t place = force_place(list, force);
+  uint32_t place = hapi_own_list_place(list, force);
   if (place == HAP_FORCES_MAX) {
     return HAP_ERROR_NOT_FOUND;
   }
@@ -153,6 +159,7 @@ hap_status hapi_own_list_remove(hapi_own_list *list, hap_force_id force)
   }
   memset(&list->wanted.setups[place], 0, sizeof list->wanted.setups[place]);
   list->wanted.samples[place] = NULL;
+  list->wanted.calls[place] = (hapi_own_call){.call = NULL};
   list_publish(list);
   (void)waves_sweep(list);
   return HAP_OK;

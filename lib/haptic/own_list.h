@@ -18,11 +18,31 @@
 
 typedef struct hapi_own_wave hapi_own_wave;
 
+/* A function of the application's; call NULL: none. */
+typedef struct hapi_own_call {
+  hap_force_call call;
+  void *user;
+  int64_t most_ns; /* that it may take */
+} hapi_own_call;
+
+/* The loop's side of it. Figures are since it was set; anyone reads them. */
+typedef struct hapi_own_caller {
+  hapi_own_call of;
+  double strikes;          /* late calls that are not forgotten */
+  _Atomic uint32_t number; /* of the setting */
+  _Atomic uint32_t out;    /* hap_force_out */
+  _Atomic uint64_t calls;
+  _Atomic uint64_t late;
+  _Atomic int64_t spent_ns;
+  _Atomic int64_t most_ns;
+} hapi_own_caller;
+
 /* setup.serial 0: no force is in this place. */
 typedef struct hapi_own_message {
   uint64_t number; /* 1, 2, 3 ... */
   hapi_force_setup setups[HAP_FORCES_MAX];
   const float *samples[HAP_FORCES_MAX];
+  hapi_own_call calls[HAP_FORCES_MAX];
 } hapi_own_message;
 
 /* Zeroed: no force. */
@@ -33,6 +53,7 @@ typedef struct hapi_own_list {
 
   /* The loop's. */
   bool partly; /* a message was taken, and not all of it is in use */
+  hapi_own_caller callers[HAP_FORCES_MAX];
 
   /* The application's, under the lock of the pointer's slot. */
   hapi_own_message wanted;
@@ -44,11 +65,23 @@ typedef struct hapi_own_list {
 void hapi_own_list_begin(hapi_own_list *list);  /* a new pointer, which the loop does not have */
 void hapi_own_list_finish(hapi_own_list *list); /* idempotent */
 
-/* [application, locked] io: of the force whose place the setup takes; v 0: it is added. samples:
- * copied, NULL for a sine. HAP_ERROR_CAPACITY, HAP_ERROR_NOT_FOUND, HAP_ERROR_MEMORY. */
+/* What is put besides numbers. */
+typedef struct hapi_own_extra {
+  const float *samples; /* copied; NULL for a sine */
+  hapi_own_call call;
+} hapi_own_extra;
+
+/* [application, locked] io: of the force whose place the setup takes; v 0: it is added.
+ * HAP_ERROR_CAPACITY, HAP_ERROR_NOT_FOUND, HAP_ERROR_MEMORY. */
 HAP_NODISCARD hap_status hapi_own_list_put(hapi_own_list *list, hap_force_id *io,
-                                           const hapi_force_setup *setup, const float *samples);
+                                           const hapi_force_setup *setup,
+                                           const hapi_own_extra *extra);
 HAP_NODISCARD hap_status hapi_own_list_remove(hapi_own_list *list, hap_force_id force);
+
+/* [application, locked] Place of a force; HAP_FORCES_MAX: it is not there. */
+uint32_t hapi_own_list_place(const hapi_own_list *list, hap_force_id force);
+/* Whether it is one that the loop calls. */
+bool hapi_own_list_calls(const hapi_own_list *list, hap_force_id force);
 
 /* [replay] Room for samples that come from the tape; NULL: no memory. Given back where no force
  * uses them any more. */

@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "guard/force_guard.h"
+
 /* Own forces on the tape: a setup, and the samples of a vibration behind it. */
 
 static void setup_move(hapi_tape *tape, uint32_t index, uint32_t *io_place, hapi_force_setup *io)
@@ -33,7 +35,7 @@ static bool setup_is_sound(const hapi_force_setup *s)
       return false;
     }
   }
-  return s->kind >= HAP_FORCE_CONSTANT && s->kind <= HAP_FORCE_VIBRATION && s->range > 0.0 &&
+  return s->kind >= HAP_FORCE_CONSTANT && s->kind <= HAP_FORCE_CALL && s->range > 0.0 &&
          s->pitch > 0.0 && s->max_force >= 0.0 && s->max_torque >= 0.0 && s->max_power >= 0.0 &&
          s->wave.sample_count <= HAP_FORCE_SAMPLES_MAX && s->wave.sample_hz >= 0.0;
 }
@@ -85,4 +87,28 @@ bool hapi_tape_next_own(hapi_haptic *haptic, uint32_t *out_index, uint32_t *out_
     }
   }
   return !tape->broken;
+}
+
+void hapi_tape_call(hapi_haptic *haptic, uint32_t index, uint32_t place, hap_wrench *io_wrench,
+                    uint32_t *io_out)
+{
+  hapi_tape *tape = haptic->tape;
+  double given[6];
+  memcpy(given, io_wrench, sizeof given);
+  if (hapi_tape_records(tape)) {
+    hapi_cell *cell = hapi_tape_put(tape, HAPI_CELL_CALL, index);
+    cell->word = place;
+    cell->flags = (uint16_t)*io_out;
+    memcpy(cell->d, given, sizeof given);
+  } else if (hapi_tape_plays(tape)) {
+    const hapi_cell *cell = hapi_tape_get(tape, HAPI_CELL_CALL, index);
+    memcpy(given, cell->d, sizeof given);
+    memcpy(io_wrench, given, sizeof given);
+    *io_out = cell->flags;
+    tape->broken = tape->broken || cell->word != place || cell->flags > HAP_FORCE_OUT_BLOCKED ||
+                   !hapi_guard_usable(io_wrench);
+    if (tape->broken) { /* the file may hold anything */
+      *io_wrench = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    }
+  }
 }

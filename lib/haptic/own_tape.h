@@ -13,4 +13,8 @@ void hapi_tape_own(hapi_haptic *haptic, uint32_t index, uint32_t place,
 bool hapi_tape_next_own(hapi_haptic *haptic, uint32_t *out_index, uint32_t *out_place,
                         hapi_force_setup *out, const float **out_samples);
 
+/* What a call gave: noted, or in a replay filled in. out: hap_force_out. */
+void hapi_tape_call(hapi_haptic *haptic, uint32_t index, uint32_t place, hap_wrench *io_wrench,
+                    uint32_t *io_out);
+
 #endif

@@ -43,12 +43,13 @@ hap_status hapi_standstill_watch(hapi_haptic *haptic, uint32_t index)
   return hapi_watchdog_start(&slot->def.device->drive.watchdog, &def);
 }
 
-/* Index + 1 of the pointer in whose device the loop is; 0: in none. */
+/* Index + 1 of the pointer in whose device, or in the call of whose force, the loop is; 0: in
+ * none. */
 static uint32_t word_pointer(const hapi_haptic *haptic, uint64_t word)
 {
   hapi_phase phase = hapi_pulse_phase(word);
   uint32_t index = hapi_pulse_index(word);
-  bool called = phase == HAPI_PHASE_READ || phase == HAPI_PHASE_WRITE;
+  bool called = phase == HAPI_PHASE_READ || phase == HAPI_PHASE_WRITE || phase == HAPI_PHASE_CALL;
   return called && index < haptic->config.capacity.pointers ? index + 1 : 0;
 }
 
@@ -82,7 +83,9 @@ void hapi_haptic_where(hapi_haptic *haptic, hap_detail *out)
 {
   uint64_t word = atomic_load(&haptic->standstill.happened);
   uint32_t pointer = word_pointer(haptic, word);
-  if (pointer > 0) {
+  if (hapi_pulse_phase(word) == HAPI_PHASE_CALL) {
+    (void)hapi_fail(out, HAP_OK, "the call of an own force did not come back");
+  } else if (pointer > 0) {
     const hapi_pointer_slot *slot = &haptic->slots[pointer - 1];
     (void)hapi_fail(out, HAP_OK, "device %s did not come back from %s",
                     atomic_load(&slot->phase) != HAPI_POINTER_EMPTY ? slot->info.name : "",

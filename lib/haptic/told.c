@@ -25,7 +25,12 @@ bool hapi_told_create(hapi_haptic *haptic)
   told->touches =
       hapi_alloc_array((size_t)3 * HAP_TOUCHES_MAX * c->pointers, sizeof *told->touches);
   told->contacts = hapi_alloc_array((size_t)3 * c->contacts, sizeof *told->contacts);
-  return told->telling.events.rows != NULL && told->telling.lists != NULL &&
+  hapi_own_hands *hands = &told->hands;
+  hands->of = hapi_alloc_array(c->pointers, sizeof *hands->of);
+  hands->list = hapi_alloc_array(c->pointers, sizeof *hands->list);
+  hands->touches = hapi_alloc_array((size_t)HAP_TOUCHES_MAX * c->pointers, sizeof *hands->touches);
+  return hands->of != NULL && hands->list != NULL && hands->touches != NULL &&
+         told->telling.events.rows != NULL && told->telling.lists != NULL &&
          told->of_pointers != NULL && told->touches != NULL && told->contacts != NULL;
 }
 
@@ -37,6 +42,9 @@ void hapi_told_destroy(hapi_haptic *haptic)
   hapi_free(told->of_pointers);
   hapi_free(told->touches);
   hapi_free(told->contacts);
+  hapi_free(told->hands.of);
+  hapi_free(told->hands.list);
+  hapi_free(told->hands.touches);
   pthread_mutex_destroy(&told->lock);
 }
 
@@ -51,6 +59,8 @@ void hapi_told_reset(hapi_haptic *haptic)
   const hapi_capacity *c = &haptic->config.capacity;
   hapi_told_things *told = &haptic->told;
   pthread_mutex_lock(&told->lock);
+  told->hands.any = false;
+  told->hands.out = HAP_FORCE_IN;
   hapi_telling_reset(&told->telling, c->pointers);
   for (uint32_t i = 0; i < c->pointers; ++i) {
     list_reset(&told->of_pointers[i]);

@@ -287,6 +287,14 @@ static void cycle_tell(hapi_physics *physics, double seconds)
                   "a device swings by itself: the force is lowered meanwhile "
                   "(hap_stats.safety.oscillation_ticks); less stiffness would help");
   }
+  if (cycle->state != NULL && cycle->state->force_out != HAP_FORCE_IN) {
+    hapi_say_once(cycle, &physics->said.force_out,
+                  cycle->state->force_out == HAP_FORCE_OUT_NOT_FINITE
+                      ? "the call of an own force gave what is not finite: it is taken out "
+                        "(hap_pointer_force_get)"
+                      : "the call of an own force takes too long: it is taken out "
+                        "(hap_pointer_force_get)");
+  }
 }
 
 static void note_times(hapi_physics *physics, const double seconds[5], double looked_s)

@@ -49,6 +49,7 @@ typedef struct hapi_said {
   bool derated;
   bool swings;
   bool cut;
+  bool force_out;
 } hapi_said;
 
 struct hapi_physics {

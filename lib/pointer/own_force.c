@@ -18,7 +18,8 @@
  *              begins at 0, is greatest at u = 1 / sqrt(3), and ends at 0 without an edge. On a
  *              closed way it does no work.
  *   detents    from the potential -strength pitch / (2 pi) cos(2 pi s / pitch)
- *   vibration  strength x envelope x sine, of the time alone: a late tick does not shift it */
+ *   vibration  strength x envelope x sine, of the time alone: a late tick does not shift it
+ *   call       what the application said in this tick */
 
 #define MAGNET_PEAK 2.598076211353316 /* 1 / (u (1 - u^2)) where that is greatest: 3 sqrt(3) / 2 */
 
@@ -121,9 +122,10 @@ static void axes_of_hand(const hapi_force_setup *setup, const hapi_pointer *p, h
   }
 }
 
-void hapi_own_force_value(const hapi_force_setup *setup, const float *samples,
-                          const hapi_pointer *pointer, double seconds, hap_wrench *out)
+void hapi_own_force_value(const hapi_own_source *source, const hapi_pointer *pointer,
+                          double seconds, hap_wrench *out)
 {
+  const hapi_force_setup *setup = source->setup;
   own_place at;
   double moment[3];
   *out = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
@@ -155,8 +157,11 @@ void hapi_own_force_value(const hapi_force_setup *setup, const float *samples,
                     out->force);
       break;
     case HAP_FORCE_VIBRATION:
-      hapi_v3_scale(vibration_force(setup, samples, seconds), setup->axis, out->force);
+      hapi_v3_scale(vibration_force(setup, source->samples, seconds), setup->axis, out->force);
       axes_of_hand(setup, pointer, out);
+      break;
+    case HAP_FORCE_CALL:
+      *out = *source->called;
       break;
   }
   hapi_v3_cross(at.arm, out->force, moment);
@@ -166,13 +171,15 @@ void hapi_own_force_value(const hapi_force_setup *setup, const float *samples,
 bool hapi_own_force_follows(const hapi_force_setup *setup)
 {
   return setup->kind == HAP_FORCE_SPRING || setup->kind == HAP_FORCE_VISCOUS ||
-         setup->kind == HAP_FORCE_MAGNET || setup->kind == HAP_FORCE_DETENTS;
+         setup->kind == HAP_FORCE_MAGNET || setup->kind == HAP_FORCE_DETENTS ||
+         (setup->kind == HAP_FORCE_CALL && setup->stiffness > 0.0);
 }
 
 double hapi_own_force_stiffness(const hapi_force_setup *setup)
 {
   switch ((hap_force_kind)setup->kind) {
     case HAP_FORCE_SPRING:
+    case HAP_FORCE_CALL:
       return setup->stiffness;
     case HAP_FORCE_MAGNET: /* at its middle */
       return MAGNET_PEAK * setup->strength / setup->range;

@@ -10,10 +10,16 @@
 #include "base/force_setup.h"
 #include "pointer/pointer.h"
 
-/* World frame, on the hand, about the pointer's origin; within what is promised. seconds: since it
- * began. samples: of the setup, NULL for a sine. */
-void hapi_own_force_value(const hapi_force_setup *setup, const float *samples,
-                          const hapi_pointer *pointer, double seconds, hap_wrench *out);
+typedef struct hapi_own_source {
+  const hapi_force_setup *setup;
+  const float *samples;     /* of the setup, NULL for a sine */
+  const hap_wrench *called; /* CALL: of this tick */
+} hapi_own_source;
+
+/* World frame, on the hand, about the pointer's origin; not yet within what is promised. seconds:
+ * since it began. */
+void hapi_own_force_value(const hapi_own_source *source, const hapi_pointer *pointer,
+                          double seconds, hap_wrench *out);
 
 /* Whether it goes by where the hand is, and not by time alone. */
 bool hapi_own_force_follows(const hapi_force_setup *setup);

@@ -6,12 +6,14 @@
 #include <hapode/forces.h>
 
 #include "base/log.h"
+#include "base/safety.h"
 #include "base/vec.h"
 #include "session/session_internal.h"
 
 /* Own forces: what the application says, checked, for lib/haptic. */
 
 #define VIBRATION_HZ_MOST 0.45 /* of haptic_hz: beyond it the samples show another wave */
+#define CALL_SHARE_MOST 0.5    /* of a haptic period */
 
 static const hap_force_def force_defaults = {
     .cookie = 0x48464631u,
@@ -48,6 +50,8 @@ const char *hap_force_kind_name(hap_force_kind kind)
       return "detents";
     case HAP_FORCE_VIBRATION:
       return "vibration";
+    case HAP_FORCE_CALL:
+      return "call";
   }
   return NULL;
 }
@@ -95,7 +99,7 @@ static hap_status force_check(const hap_force_def *d, double haptic_hz, hap_deta
 {
   const hap_force_wave *vibration = &d->vibration;
   const hapi_number_rule rules[] = {
-      HAPI_RULE(d, kind, HAP_FORCE_CONSTANT, HAP_FORCE_VIBRATION),
+      HAPI_RULE(d, kind, HAP_FORCE_CONSTANT, HAP_FORCE_CALL),
       HAPI_RULE(d, frame, HAP_FORCE_WORLD, HAP_FORCE_POINTER),
       HAPI_RULE(d, target, HAP_FORCE_POINT, HAP_FORCE_PLANE),
       HAPI_RULE(d, stiffness, 0.0, 1e9),
@@ -113,6 +117,7 @@ static hap_status force_check(const hap_force_def *d, double haptic_hz, hap_deta
       HAPI_RULE_OR(vibration, hold_s, HAP_FORCE_FOR_EVER, 0.0, 3600.0),
       HAPI_RULE(vibration, decay_s, 0.0, 3600.0),
       HAPI_RULE(vibration, sample_hz, 1e-3, 1e6),
+      HAPI_RULE(d, call_most_s, 0.0, CALL_SHARE_MOST / haptic_hz),
   };
   bool turns = d->kind == HAP_FORCE_CONSTANT || d->kind == HAP_FORCE_VIBRATION;
   HAPI_TRY(hapi_numbers_check(rules, sizeof rules / sizeof rules[0], detail));
@@ -121,6 +126,15 @@ static hap_status force_check(const hap_force_def *d, double haptic_hz, hap_deta
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "frame is HAP_FORCE_POINTER: a force of kind %s is in the world",
                      hap_force_kind_name((hap_force_kind)d->kind));
+  }
+  if ((d->kind == HAP_FORCE_CALL) != (d->call != NULL)) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     d->call == NULL ? "call is NULL: a force of kind call needs a function"
+                                     : "call is set: only a force of kind call has a function");
+  }
+  if (d->kind == HAP_FORCE_CALL && !(d->max_force > 0.0)) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "max_force is 0: say how large the force of the call gets");
   }
   return samples_check(vibration, detail);
 }
@@ -169,6 +183,9 @@ static void setup_fill(const hap_force_def *d, hapi_force_setup *out)
       out->wave.sample_hz = d->vibration.sample_hz;
       out->wave.sample_count = d->vibration.sample_count;
       break;
+    case HAP_FORCE_CALL:
+      out->stiffness = d->stiffness;
+      break;
   }
 }
 
@@ -181,9 +198,13 @@ static hap_status force_put(hap_session *session, hap_pointer_id pointer, hap_fo
   hap_status status = hapi_def_read(&force_type, def, &d, &detail);
   status = status >= HAP_OK ? force_check(&d, session->def.haptic_hz, &detail) : status;
   if (status >= HAP_OK) {
+    double share =
+        d.call_most_s > 0.0 ? d.call_most_s * session->def.haptic_hz : HAPI_SAFETY_CALL_SHARE;
+    const hapi_own_extra extra = {
+        .samples = d.vibration.samples,
+        .call = {d.call, d.user, (int64_t)(1e9 * share / session->def.haptic_hz)}};
     setup_fill(&d, &setup);
-    status =
-        hapi_haptic_put_force(session->haptic, pointer, io, &setup, d.vibration.samples, &detail);
+    status = hapi_haptic_put_force(session->haptic, pointer, io, &setup, &extra, &detail);
   }
   return status == HAP_OK ? status : hapi_session_fail(session, status, "%s", detail.text);
 }
@@ -216,4 +237,19 @@ hap_status hap_pointer_force_remove(hap_session *session, hap_pointer_id pointer
   HAPI_TRY(hapi_session_may_change(session));
   hap_status status = hapi_haptic_remove_force(session->haptic, pointer, force, &detail);
   return hapi_session_note(session, status, &detail);
+}
+
+hap_status hap_pointer_force_get(hap_session *session, hap_pointer_id pointer, hap_force_id force,
+                                 hap_force_state *out, size_t size_of_out)
+{
+  hap_force_state state;
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_status status = hapi_haptic_get_force(session->haptic, pointer, force, &state);
+  if (status >= HAP_OK) {
+    hap_status given = hapi_struct_give(&state, sizeof state, out, size_of_out);
+    status = given < HAP_OK ? given : status;
+  }
+  return hapi_session_say(session, status, __func__);
 }

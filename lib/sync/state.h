@@ -105,8 +105,9 @@ typedef struct hapi_state {
   double hand_impulse[3];  /* N s, given to bodies that can move by all pointers since start */
   double owned_impulse[3]; /* N s, what the loop's bodies got of it, and from bodies of ODE */
   hapi_tick_load load;
-  bool derated; /* since the start: some tick had less force because ticks came late */
-  bool swings;  /* the same because a device swung by itself */
+  bool derated;       /* since the start: some tick had less force because ticks came late */
+  bool swings;        /* the same because a device swung by itself */
+  uint32_t force_out; /* hap_force_out of the call that was taken out last; 0: none was */
   hapi_tick_work work;
   uint32_t unsolved; /* since the start: ticks in a row, at most, that the solver did not solve */
   hap_model model;

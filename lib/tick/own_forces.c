@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/safety.h"
 #include "base/vec.h"
 #include "pointer/own_force.h"
@@ -13,13 +14,36 @@
  * and less, whatever is changed again meanwhile. So an application may move a spring at each of its
  * frames. */
 
+/* What is given from now on is another thing. */
+static void own_part(hapi_own_force *own)
+{
+  own->changed = true;
+  own->before = (hapi_promise){.force = hapi_v3_norm(own->gives.force),
+                               .torque = hapi_v3_norm(own->gives.torque)};
+}
+
+bool hapi_own_force_calls(const hapi_own_force *own)
+{
+  return own->setup.serial != 0 && own->setup.kind == HAP_FORCE_CALL && !own->leaves &&
+         own->out == HAP_FORCE_IN;
+}
+
+void hapi_own_force_called(hapi_own_force *own, const hap_wrench *wrench, uint32_t out)
+{
+  HAPI_ASSERT(hapi_own_force_calls(own));
+  own->called = *wrench;
+  own->out = out;
+  if (out != HAP_FORCE_IN) {
+    own_part(own);
+  }
+}
+
 void hapi_own_force_change(hapi_own_force *own, const hapi_force_setup *setup, const float *samples,
                            int64_t now_ns)
 {
   bool other = setup->serial != own->setup.serial;
+  own_part(own);
   own->changed = own->setup.serial != 0; /* what comes to an empty place fades in by its share */
-  own->before = (hapi_promise){.force = hapi_v3_norm(own->gives.force),
-                               .torque = hapi_v3_norm(own->gives.torque)};
   if (setup->serial == 0) {
     own->leaves = true;
     own->samples = NULL;
@@ -34,24 +58,28 @@ void hapi_own_force_change(hapi_own_force *own, const hapi_force_setup *setup, c
   own->setup = *setup;
   own->samples = samples;
   own->leaves = false;
+  own->out = HAP_FORCE_IN;
 }
 
-/* What the setup comes to, without what a change has left. */
-static void own_value(hapi_own_force *own, const hapi_pointer *p, int64_t now_ns, double seconds,
+/* What the setup comes to, without what a change has left. True: a call gave more than is
+ * promised. */
+static bool own_value(hapi_own_force *own, const hapi_pointer *p, int64_t now_ns, double seconds,
                       hap_wrench *out)
 {
   const hapi_force_setup *setup = &own->setup;
-  if (own->leaves) {
+  if (own->leaves || own->out != HAP_FORCE_IN) {
     *out = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-    return;
+    return false;
   }
   double in = setup->fade_in_s > 0.0 ? seconds / setup->fade_in_s : 1.0;
   own->share = hapi_min(own->share + in, 1.0);
-  hapi_own_force_value(setup, own->samples, p, 1e-9 * (double)(now_ns - own->begin_ns), out);
+  const hapi_own_source source = {setup, own->samples, &own->called};
+  hapi_own_force_value(&source, p, 1e-9 * (double)(now_ns - own->begin_ns), out);
   hapi_v3_scale(own->share, out->force, out->force);
   hapi_v3_scale(own->share, out->torque, out->torque);
-  (void)hapi_v3_shorten(out->force, setup->max_force);
-  (void)hapi_v3_shorten(out->torque, setup->max_torque);
+  bool force = hapi_v3_shorten(out->force, setup->max_force);
+  bool torque = hapi_v3_shorten(out->torque, setup->max_torque);
+  return (force || torque) && setup->kind == HAP_FORCE_CALL;
 }
 
 /* True: it was more than is promised. */
@@ -59,7 +87,7 @@ static bool own_run(hapi_own_force *own, const hapi_pointer *p, int64_t now_ns, 
                     hap_wrench *out)
 {
   const hapi_force_setup *setup = &own->setup;
-  own_value(own, p, now_ns, seconds, out);
+  bool beyond = own_value(own, p, now_ns, seconds, out);
   if (own->changed) {
     hapi_v3_sub(own->gives.force, out->force, own->offset.force);
     hapi_v3_sub(own->gives.torque, out->torque, own->offset.torque);
@@ -77,7 +105,7 @@ static bool own_run(hapi_own_force *own, const hapi_pointer *p, int64_t now_ns, 
                                 setup->max_power};
   bool more = hapi_promise_keep(&promise, &own->purse, &p->declared, seconds, out);
   own->gives = *out;
-  return more;
+  return more || beyond;
 }
 
 void hapi_own_forces_declare(hapi_own_force *forces, hapi_pointer *pointer, int64_t now_ns,

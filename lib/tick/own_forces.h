@@ -20,6 +20,8 @@ typedef struct hapi_own_force {
   bool changed;         /* since the last tick */
   int64_t begin_ns;     /* of a vibration */
   double share;         /* 0..1, of the fade-in */
+  hap_wrench called;    /* CALL: what came of it in this tick, finite */
+  uint32_t out;         /* hap_force_out of it; then it gives nothing */
   hap_wrench gives;     /* in the last tick */
   /* What a change would make leap, and how much of it is left, 0..1. */
   hap_wrench offset;
@@ -32,6 +34,12 @@ typedef struct hapi_own_force {
  * force. serial 0: the force leaves. */
 void hapi_own_force_change(hapi_own_force *own, const hapi_force_setup *setup, const float *samples,
                            int64_t now_ns);
+
+/* CALL, before declare: what the application gave. out: hap_force_out; HAP_FORCE_IN: it goes on. */
+void hapi_own_force_called(hapi_own_force *own, const hap_wrench *wrench, uint32_t out);
+
+/* Whether its function is to be called in this tick. */
+bool hapi_own_force_calls(const hapi_own_force *own);
 
 /* Once a tick, after the devices were read: adds the forces of a pointer to what is declared.
  * forces: HAP_FORCES_MAX. */

@@ -322,6 +322,27 @@ static void grippers_follow(const listening *at)
   }
 }
 
+static void forces_follow(const listening *at)
+{
+  const hapi_own_force *own = &at->tick->own[(size_t)at->index * HAP_FORCES_MAX];
+  uint32_t before = at->list->forces_out;
+  at->list->forces_out = 0;
+  for (uint32_t i = 0; at->pointer->own && i < HAP_FORCES_MAX; ++i) {
+    if (own[i].setup.serial == 0 || own[i].out == HAP_FORCE_IN) {
+      continue;
+    }
+    at->list->forces_out |= 1u << i;
+    if (at->ring != NULL && (before >> i & 1u) == 0) {
+      event_put(at->ring,
+                &(hap_event){.kind = HAP_EVENT_FORCE_OUT,
+                             .number = own[i].out,
+                             .time_ns = at->tick->facts.now_ns,
+                             .pointer.v = hapi_pointer_id_of(at->list->generation, at->index + 1),
+                             .force = hapi_own_force_id(own[i].setup.serial, i)});
+    }
+  }
+}
+
 static void fault_follow(hapi_telling *telling, const hapi_tick *tick, hapi_event_ring *ring)
 {
   const hapi_fault_latch *latch = &tick->guard.latch;
@@ -344,6 +365,7 @@ static void list_leave(const listening *at)
   }
   at->list->count = 0;
   at->list->buttons = at->list->closed = 0;
+  at->list->forces_out = 0;
 }
 
 /* False for NaN and infinity, too, which the guard makes a fault of. */
@@ -396,6 +418,7 @@ void hapi_telling_follow(hapi_telling *telling, const hapi_tick *tick, bool even
       if (at.pointer->has_axes) {
         grippers_follow(&at);
       }
+      forces_follow(&at);
     }
   }
   fault_follow(telling, tick, ring);
@@ -408,6 +431,18 @@ uint32_t hapi_telling_touches(const hapi_telling *telling, uint32_t pointer, hap
   for (uint32_t i = 0; i < list->count; ++i) {
     if (list->of[i].pushes) {
       out[count++] = list->of[i].told;
+    }
+  }
+  return count;
+}
+
+uint32_t hapi_telling_point(const hapi_telling *telling, uint32_t pointer, const hap_touch **out)
+{
+  const hapi_felt_list *list = &telling->lists[pointer];
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < list->count; ++i) {
+    if (list->of[i].pushes) {
+      out[count++] = &list->of[i].told;
     }
   }
   return count;

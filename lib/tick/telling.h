@@ -42,6 +42,7 @@ typedef struct hapi_felt_list {
   uint32_t generation; /* of the pointer */
   uint32_t buttons;
   uint32_t closed; /* grippers, a bit for each axis */
+  uint32_t forces_out; /* a bit for each own force whose call was taken out, as told */
   uint32_t count;
   hapi_felt of[HAP_TOUCHES_MAX];
 } hapi_felt_list;
@@ -61,6 +62,8 @@ void hapi_telling_follow(hapi_telling *telling, const hapi_tick *tick, bool even
 
 /* Those of a pointer that push now, at most HAP_TOUCHES_MAX. */
 uint32_t hapi_telling_touches(const hapi_telling *telling, uint32_t pointer, hap_touch *out);
+/* The same by address, valid until the next follow. */
+uint32_t hapi_telling_point(const hapi_telling *telling, uint32_t pointer, const hap_touch **out);
 
 /* Pairs of geoms that press on each other; returns their number, at most capacity. */
 uint32_t hapi_telling_contacts(const hapi_tick *tick, hap_body_contact *out, uint32_t capacity);
