@@ -29,6 +29,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "push_without_ode": "docs/scene.md",
     "grip_and_feel": "docs/grippers.md",
     "two_fingers": "docs/fingers.md",
+    "trigger_volume": "docs/force-calls.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -181,6 +182,14 @@ def check_own_forces(program):
     point(len(rows) == 20 and max(along[1:9]) <= 0.8 and max(along[12:]) > 0.8,
           "the clicks get harder", str(rows))
     point(all(-1.3 < float(row[2]) < -1.1 for row in rows[1:]), "the rail pulls", str(rows))
+
+
+def check_trigger_volume(program):
+    rows = rows_of(run(program), r"^(inside|outside), entered ([0-9]+) times$")
+    point(len(rows) == 12 and {row[0] for row in rows} == {"inside", "outside"} and
+          rows[-1][1] == "2", "the hand goes through the volume twice", str(rows))
+
+
 def check_push_without_ode(program):
     rows = rows_of(run(program), r"^mallet at (-?[0-9.]+) m, hand feels (-?[0-9.]+) N$")
     point(len(rows) == 5 and float(rows[0][0]) == 0.0 and float(rows[-1][0]) > 0.1,
