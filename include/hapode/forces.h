@@ -31,8 +31,11 @@ typedef enum hap_force_kind {
 
 /* Whose axes and origin are meant. Values are never renumbered. */
 typedef enum hap_force_frame {
-  HAP_FORCE_WORLD = 0,  /* the axes of the world */
-  HAP_FORCE_POINTER = 1 /* the axes of the hand: CONSTANT and VIBRATION turn with it */
+  HAP_FORCE_WORLD = 0,   /* the axes of the world */
+  HAP_FORCE_POINTER = 1, /* the axes of the hand: CONSTANT and VIBRATION turn with it */
+  /* SPRING, VISCOUS, MAGNET and DETENTS: origin and axis are in the frame of body and go with it;
+   * velocities are those that the body sees. The body gets the opposite force and torque */
+  HAP_FORCE_BODY = 2
 } hap_force_frame;
 
 /* What SPRING, VISCOUS and MAGNET go by: the way to a point, or of a line or a plane the part of it
@@ -141,8 +144,9 @@ typedef struct hap_force_def {
 
   hap_force_call call; /* CALL; NULL (default) for other kinds */
   void *user;          /* handed to call; the application's */
-  double
-      call_most_s; /* s, 0..0.5 of a haptic period, that a call may take; 0 (default): 0.1 of it */
+  /* s, 0..0.5 of a haptic period, that a call may take; 0 (default): 0.1 of the period */
+  double call_most_s;
+  void *body; /* dBodyID of hapode/ode.h, HAP_FORCE_BODY; NULL (default) for other frames */
 } hap_force_def;
 
 #define HAP_FORCE_POWER_AUTO (-1.0) /* in place of a max_power: by the kind of the force */
@@ -165,7 +169,7 @@ HAP_API void hap_force_def_init(hap_force_def *def, size_t size_of_def);
  * field. HAP_ERROR_CAPACITY: HAP_FORCES_MAX. HAP_ERROR_NOT_FOUND: no such pointer.
  * HAP_ERROR_UNINITIALISED: def did not go through hap_force_def_init. HAP_ERROR_STATE: the session
  * plays a recording, which has its own. HAP_ERROR_MEMORY: none for the samples. HAP_ERROR_THREAD:
- * from within a call of a force. */
+ * from within a call of a force. HAP_ERROR_NOT_FOUND: or the session does not know the body. */
 HAP_NODISCARD HAP_API hap_status hap_pointer_force_add(hap_session *session, hap_pointer_id pointer,
                                                        const hap_force_def *def, hap_force_id *out);
 

@@ -42,6 +42,7 @@ typedef struct hapi_force_setup {
   double max_force;
   double max_torque;
   double max_power;
+  uint64_t body; /* birth of the one that the force is bound to; 0: none */
 } hapi_force_setup;
 
 /* The v of its hap_force_id; place: among the pointer's forces. */

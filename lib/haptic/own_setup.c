@@ -63,7 +63,8 @@ static void setup_promise(const hapi_pointer_slot *slot, hapi_force_setup *io)
   io->max_torque = io->max_torque > 0.0 ? io->max_torque : torque + arm * io->max_force;
   if (io->max_power < 0.0) {
     double turns = io->kind == HAP_FORCE_CALL ? io->max_torque : torque;
-    io->max_power = io->kind == HAP_FORCE_VISCOUS
+    /* A medium that moves with a body drags the hand along. */
+    io->max_power = io->kind == HAP_FORCE_VISCOUS && io->body == 0
                         ? 0.0
                         : HAPI_SAFETY_OWN_SPEED * io->max_force + HAPI_SAFETY_OWN_SPIN * turns;
   }

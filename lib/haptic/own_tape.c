@@ -28,12 +28,16 @@ static bool setup_is_sound(const hapi_force_setup *s)
   if (s->serial == 0) {
     return s->wave.sample_count == 0;
   }
-  double numbers[(sizeof *s - offsetof(hapi_force_setup, origin)) / sizeof(double)];
+  double numbers[(offsetof(hapi_force_setup, body) - offsetof(hapi_force_setup, origin)) /
+                 sizeof(double)];
   memcpy(numbers, s->origin, sizeof numbers);
   for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i) {
     if (!(fabs(numbers[i]) <= HAP_FORCE_FOR_EVER)) {
       return false;
     }
+  }
+  if ((s->frame == HAP_FORCE_BODY) != (s->body != 0)) {
+    return false;
   }
   return s->kind >= HAP_FORCE_CONSTANT && s->kind <= HAP_FORCE_CALL && s->range > 0.0 &&
          s->pitch > 0.0 && s->max_force >= 0.0 && s->max_torque >= 0.0 && s->max_power >= 0.0 &&

@@ -863,6 +863,11 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
     range->fastest = speed > range->fastest ? speed : range->fastest;
   }
   hapi_cover_begin(&range->links.cover);
+  for (uint32_t i = 0; i < nearby->slots.body_high; ++i) {
+    if (nearby->slots.bodies[i].held) {
+      range_enqueue(nearby, nearby->slots.bodies[i].known);
+    }
+  }
   for (uint32_t i = 0; i < hit_count; ++i) { /* nearest first */
     uint32_t known = hapi_bodies_find(
         &nearby->world->bodies, hapi_geom_body(nearby->world, nearby->neighbors.hits[i].geom));

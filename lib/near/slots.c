@@ -114,7 +114,7 @@ hapi_contact_slot *hapi_slots_new_contact(hapi_nearby *nearby, uint32_t body, dG
 void hapi_slots_begin_model(hapi_nearby *nearby)
 {
   for (uint32_t i = 0; i < nearby->slots.body_high; ++i) {
-    nearby->slots.bodies[i].wanted = false;
+    nearby->slots.bodies[i].wanted = nearby->slots.bodies[i].held = false;
   }
   for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
     nearby->slots.contacts[i].wanted = false;

@@ -30,6 +30,7 @@ typedef struct hapi_body_slot {
   uint32_t flags;      /* of the message */
   uint64_t retired_at; /* first model without it */
   bool wanted;         /* scratch: in the model being built */
+  bool held;           /* by a pointer: it is in the model wherever it is */
   bool alive;          /* scratch: a geom of it is there after after_step */
   bool pushed;         /* by a pointer in the last interval: the loop owns its motion */
   bool pose_changed;   /* since then, by the application */

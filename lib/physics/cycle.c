@@ -229,10 +229,11 @@ void hapi_physics_test(hapi_physics *physics)
   }
 }
 
-/* It simulates in the hand's time alone, and with the step as created. */
+/* It simulates in the hand's time alone, with the step as created, and knows of contacts alone. */
 static bool may_look_back(const hapi_cycle *cycle)
 {
-  return cycle->time_scale == 1.0 && cycle->step_scale == 1.0 && cycle->steady;
+  return !hapi_state_binds(cycle->state) && cycle->time_scale == 1.0 && cycle->step_scale == 1.0 &&
+         cycle->steady;
 }
 
 static void look_back(hapi_physics *physics, int64_t now_ns)

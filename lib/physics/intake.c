@@ -124,6 +124,15 @@ hap_status hapi_physics_forget(hapi_physics *physics, struct dxBody *body)
   return status;
 }
 
+hap_status hapi_physics_birth(hapi_physics *physics, struct dxBody *body, uint64_t *out)
+{
+  pthread_mutex_lock(&physics->drawing.lock);
+  uint32_t index = hapi_bodies_find(&physics->world.bodies, body);
+  *out = index != HAPI_NONE ? physics->world.bodies.rests[index].birth : 0;
+  pthread_mutex_unlock(&physics->drawing.lock);
+  return index != HAPI_NONE ? HAP_OK : HAP_ERROR_NOT_FOUND;
+}
+
 hap_status hapi_physics_teleport(hapi_physics *physics, struct dxBody *body, const hap_pose *pose)
 {
   const hapi_watch watch = physics->watch; /* of what is traced the entry stays the same */

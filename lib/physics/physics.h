@@ -83,6 +83,8 @@ hap_status hapi_physics_poses(hapi_physics *physics, int64_t time_ns, struct dxB
                               size_t count, hap_pose *out, size_t *out_unknown);
 hap_status hapi_physics_poses_now(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
                                   hap_pose *out, size_t *out_unknown);
+/* [any] The number that names the body in every run alike. HAP_ERROR_NOT_FOUND: it is not known. */
+hap_status hapi_physics_birth(hapi_physics *physics, struct dxBody *body, uint64_t *out);
 hap_status hapi_physics_roles(hapi_physics *physics, struct dxBody *const *bodies, size_t count,
                               hap_body_role *out, size_t *out_unknown);
 /* [any] *out_step_ns: H. */

@@ -178,6 +178,7 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, ha
   out->slot = index;
   out->generation = slot->generation;
   out->epoch = slot->epoch;
+  out->birth = p->world->bodies.entries[slot->known].rest->birth;
   out->tag = dBodyGetWorld(body) == p->world->ode.world ? body : NULL; /* else a carrier */
   out->flags = slot->flags | (slot->pushed ? 0u : (uint32_t)HAPI_BODY_FOLLOWS);
   hapi_pose_read(body, &out->pose);

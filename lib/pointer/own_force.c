@@ -41,32 +41,62 @@ static double sine_of_turns(double x)
 /* ---- where it is ---- */
 
 /* The way from the target, or a velocity: what the target makes of it. */
-static void target_part(const hapi_force_setup *setup, double v[3])
+static void target_part(const hapi_force_setup *setup, const double axis[3], double v[3])
 {
-  double along = hapi_v3_dot(v, setup->axis);
+  double along = hapi_v3_dot(v, axis);
   if (setup->target == HAP_FORCE_LINE) {
-    hapi_v3_madd(v, -along, setup->axis, v);
+    hapi_v3_madd(v, -along, axis, v);
   } else if (setup->target == HAP_FORCE_PLANE) {
-    hapi_v3_scale(along, setup->axis, v);
+    hapi_v3_scale(along, axis, v);
   }
 }
 
-/* Arm, way from the origin and velocity of the point on which it acts. */
+/* Arm, way from the origin and velocity of the point on which it acts; world axes. */
 typedef struct own_place {
+  double axis[3];
   double arm[3];
   double way[3];
   double velocity[3];
 } own_place;
 
-static void own_find(const hapi_force_setup *setup, const hapi_pointer *p, own_place *out)
+void hapi_own_force_arm(const hapi_force_setup *setup, const hapi_pointer *pointer, double out[3])
 {
-  const hapi_pointer_handle *hand = &p->handle;
+  hapi_quat_rotate(pointer->handle.quat, setup->point, out);
+}
+
+/* As a body sees it that the force is bound to: the target goes with the body. */
+static void own_find_from(const hapi_force_setup *setup, const hapi_own_frame *body,
+                          const double point[3], own_place *io)
+{
+  const double *q = body->pose.quat_wxyz;
+  double origin[3];
+  double arm[3];
   double swing[3];
-  hapi_quat_rotate(hand->quat, setup->point, out->arm);
-  hapi_v3_add(hand->position, out->arm, out->way);
-  hapi_v3_sub(out->way, setup->origin, out->way);
+  hapi_quat_rotate(q, setup->axis, io->axis);
+  hapi_quat_rotate(q, setup->origin, origin);
+  hapi_v3_sub(point, body->pose.position, arm);
+  hapi_v3_sub(arm, origin, io->way);
+  hapi_v3_cross(body->twist.angular, arm, swing);
+  hapi_v3_sub(io->velocity, swing, io->velocity);
+  hapi_v3_sub(io->velocity, body->twist.linear, io->velocity);
+}
+
+static void own_find(const hapi_own_source *source, const hapi_pointer *p, own_place *out)
+{
+  const hapi_force_setup *setup = source->setup;
+  const hapi_pointer_handle *hand = &p->handle;
+  double point[3];
+  double swing[3];
+  hapi_own_force_arm(setup, p, out->arm);
+  hapi_v3_add(hand->position, out->arm, point);
   hapi_v3_cross(hand->spin, out->arm, swing);
   hapi_v3_add(hand->velocity, swing, out->velocity);
+  if (source->body != NULL) {
+    own_find_from(setup, source->body, point, out);
+    return;
+  }
+  hapi_v3_copy(setup->axis, out->axis);
+  hapi_v3_sub(point, setup->origin, out->way);
 }
 
 /* ---- kinds ---- */
@@ -129,10 +159,10 @@ void hapi_own_force_value(const hapi_own_source *source, const hapi_pointer *poi
   own_place at;
   double moment[3];
   *out = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  own_find(setup, pointer, &at);
-  target_part(setup, at.velocity);
-  double along = hapi_v3_dot(at.way, setup->axis);
-  target_part(setup, at.way);
+  own_find(source, pointer, &at);
+  target_part(setup, at.axis, at.velocity);
+  double along = hapi_v3_dot(at.way, at.axis);
+  target_part(setup, at.axis, at.way);
   switch ((hap_force_kind)setup->kind) {
     case HAP_FORCE_CONSTANT:
       hapi_v3_copy(setup->force, out->force);
@@ -153,8 +183,7 @@ void hapi_own_force_value(const hapi_own_source *source, const hapi_pointer *poi
       magnet_force(setup, at.way, out->force);
       break;
     case HAP_FORCE_DETENTS:
-      hapi_v3_scale(-setup->strength * sine_of_turns(along / setup->pitch), setup->axis,
-                    out->force);
+      hapi_v3_scale(-setup->strength * sine_of_turns(along / setup->pitch), at.axis, out->force);
       break;
     case HAP_FORCE_VIBRATION:
       hapi_v3_scale(vibration_force(setup, source->samples, seconds), setup->axis, out->force);
@@ -173,6 +202,12 @@ bool hapi_own_force_follows(const hapi_force_setup *setup)
   return setup->kind == HAP_FORCE_SPRING || setup->kind == HAP_FORCE_VISCOUS ||
          setup->kind == HAP_FORCE_MAGNET || setup->kind == HAP_FORCE_DETENTS ||
          (setup->kind == HAP_FORCE_CALL && setup->stiffness > 0.0);
+}
+
+double hapi_own_force_damping(const hapi_force_setup *setup)
+{
+  bool damps = setup->kind == HAP_FORCE_SPRING || setup->kind == HAP_FORCE_VISCOUS;
+  return damps ? setup->damping : 0.0;
 }
 
 double hapi_own_force_stiffness(const hapi_force_setup *setup)

@@ -10,11 +10,21 @@
 #include "base/force_setup.h"
 #include "pointer/pointer.h"
 
+/* A body to which a force is bound: its frame, and how that moves. */
+typedef struct hapi_own_frame {
+  hap_pose pose;
+  hap_twist twist;
+} hapi_own_frame;
+
 typedef struct hapi_own_source {
   const hapi_force_setup *setup;
-  const float *samples;     /* of the setup, NULL for a sine */
-  const hap_wrench *called; /* CALL: of this tick */
+  const hapi_own_frame *body; /* NULL: it is bound to none */
+  const float *samples;       /* of the setup, NULL for a sine */
+  const hap_wrench *called;   /* CALL: of this tick */
 } hapi_own_source;
+
+/* Where on the pointer it acts, from the pointer's origin, world axes. */
+void hapi_own_force_arm(const hapi_force_setup *setup, const hapi_pointer *pointer, double out[3]);
 
 /* World frame, on the hand, about the pointer's origin; not yet within what is promised. seconds:
  * since it began. */
@@ -23,6 +33,9 @@ void hapi_own_force_value(const hapi_own_source *source, const hapi_pointer *poi
 
 /* Whether it goes by where the hand is, and not by time alone. */
 bool hapi_own_force_follows(const hapi_force_setup *setup);
+
+/* N s/m, the most that a velocity can change it. */
+double hapi_own_force_damping(const hapi_force_setup *setup);
 
 /* N/m, the most that a way can change it. */
 double hapi_own_force_stiffness(const hapi_force_setup *setup);

@@ -291,6 +291,7 @@ typedef struct hapi_pointers {
   hapi_tool_hull *hulls; /* likewise */
   uint32_t high;         /* from here on no pointer has come yet; before it some may have left */
   bool proxies;          /* some pointer is or may become one */
+  bool pushes;           /* in this tick some own force is bound to a body */
 } hapi_pointers;
 
 #endif

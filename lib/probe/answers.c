@@ -54,5 +54,5 @@ bool hapi_body_is_whole(const hapi_slots *slots, uint32_t body)
     const hapi_contact_slot *contact = &slots->contacts[i];
     contacts += contact->phase == HAPI_SLOT_LIVE && contact->body == body;
   }
-  return slots->bodies[body].linked || contacts > 1;
+  return slots->bodies[body].linked || slots->bodies[body].held || contacts > 1;
 }

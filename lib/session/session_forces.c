@@ -100,7 +100,7 @@ static hap_status force_check(const hap_force_def *d, double haptic_hz, hap_deta
   const hap_force_wave *vibration = &d->vibration;
   const hapi_number_rule rules[] = {
       HAPI_RULE(d, kind, HAP_FORCE_CONSTANT, HAP_FORCE_CALL),
-      HAPI_RULE(d, frame, HAP_FORCE_WORLD, HAP_FORCE_POINTER),
+      HAPI_RULE(d, frame, HAP_FORCE_WORLD, HAP_FORCE_BODY),
       HAPI_RULE(d, target, HAP_FORCE_POINT, HAP_FORCE_PLANE),
       HAPI_RULE(d, stiffness, 0.0, 1e9),
       HAPI_RULE(d, damping, 0.0, 1e6),
@@ -126,6 +126,18 @@ static hap_status force_check(const hap_force_def *d, double haptic_hz, hap_deta
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                      "frame is HAP_FORCE_POINTER: a force of kind %s is in the world",
                      hap_force_kind_name((hap_force_kind)d->kind));
+  }
+  bool bindable = d->kind == HAP_FORCE_SPRING || d->kind == HAP_FORCE_VISCOUS ||
+                  d->kind == HAP_FORCE_MAGNET || d->kind == HAP_FORCE_DETENTS;
+  if (d->frame == HAP_FORCE_BODY && !bindable) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "frame is HAP_FORCE_BODY: a force of kind %s is bound to no body",
+                     hap_force_kind_name((hap_force_kind)d->kind));
+  }
+  if ((d->frame == HAP_FORCE_BODY) != (d->body != NULL)) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     d->body == NULL ? "body is NULL: HAP_FORCE_BODY needs one"
+                                     : "body is set: that needs the frame HAP_FORCE_BODY");
   }
   if ((d->kind == HAP_FORCE_CALL) != (d->call != NULL)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT,
@@ -189,6 +201,18 @@ static void setup_fill(const hap_force_def *d, hapi_force_setup *out)
   }
 }
 
+static hap_status body_find(hap_session *session, void *body, uint64_t *out, hap_detail *detail)
+{
+  *out = 0;
+  if (body == NULL || hapi_physics_birth(session->physics, body, out) >= HAP_OK) {
+    return HAP_OK;
+  }
+  return hapi_fail(detail, HAP_ERROR_NOT_FOUND,
+                   "the body is not known to the session: it was destroyed or forgotten, or it has "
+                   "neither geom nor joint and was not adopted (hap_session_adopt_body), or it is "
+                   "new, and the next step will see it");
+}
+
 static hap_status force_put(hap_session *session, hap_pointer_id pointer, hap_force_id *io,
                             const hap_force_def *def)
 {
@@ -204,7 +228,10 @@ static hap_status force_put(hap_session *session, hap_pointer_id pointer, hap_fo
         .samples = d.vibration.samples,
         .call = {d.call, d.user, (int64_t)(1e9 * share / session->def.haptic_hz)}};
     setup_fill(&d, &setup);
-    status = hapi_haptic_put_force(session->haptic, pointer, io, &setup, &extra, &detail);
+    status = body_find(session, d.body, &setup.body, &detail);
+    status = status >= HAP_OK
+                 ? hapi_haptic_put_force(session->haptic, pointer, io, &setup, &extra, &detail)
+                 : status;
   }
   return status == HAP_OK ? status : hapi_session_fail(session, status, "%s", detail.text);
 }

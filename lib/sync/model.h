@@ -155,6 +155,7 @@ typedef struct hapi_model_body {
 
   double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
 
+  uint64_t birth;  /* of the body: no other has ever the same */
   hapi_tag tag;    /* NULL: a body of the session itself */
   uint32_t course; /* of a driven one: 1 + index into the model's courses; 0: by its twist */
 

@@ -5,6 +5,8 @@
 
 /* haptic -> physics: the state of the loop after a tick. */
 
+#include <hapode/forces.h>
+
 #include "sync/message.h"
 
 typedef struct hapi_state_pointer {
@@ -17,8 +19,10 @@ typedef struct hapi_state_pointer {
   double finger_radius;
   hap_pose pose;
   hap_twist twist;
-  uint32_t is_tool; /* a hull: see hapi_state_hulls */
-  double extent;    /* m, of a hull as in hapi_near_tool, else the radius */
+  uint32_t is_tool;     /* a hull: see hapi_state_hulls */
+  double extent;        /* m, of a hull as in hapi_near_tool, else the radius */
+  uint32_t bound_count; /* bodies to which own forces are bound; the births of them: */
+  uint64_t bound[HAP_FORCES_MAX];
 } hapi_state_pointer;
 
 typedef struct hapi_state_body {
@@ -133,6 +137,17 @@ HAPI_MESSAGE_ARRAY(hapi_state_pointers, hapi_state, hapi_state_pointer, pointers
 HAPI_MESSAGE_ARRAY(hapi_state_springs, hapi_state, hapi_state_spring, springs_offset)
 HAPI_MESSAGE_ARRAY(hapi_state_joints, hapi_state, hapi_state_joint, joints_offset)
 HAPI_MESSAGE_ARRAY(hapi_state_sides, hapi_state, hapi_tool_side, sides_offset)
+
+/* Whether some own force is bound to a body. NULL: none is. */
+static inline bool hapi_state_binds(hapi_state *state)
+{
+  bool any = false;
+  for (uint32_t i = 0; state != NULL && i < state->pointer_count; ++i) {
+    const hapi_state_pointer *pointer = &hapi_state_pointers(state)[i];
+    any = any || (pointer->generation != 0 && pointer->bound_count > 0);
+  }
+  return any;
+}
 
 /* By pointer; not set for a sphere. */
 HAPI_MESSAGE_ARRAY(hapi_state_hulls, hapi_state, hapi_tool_hull, hulls_offset)

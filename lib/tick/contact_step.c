@@ -478,6 +478,10 @@ void hapi_contact_step(hapi_tick *tick)
   const hapi_solver *solver = &tick->rows.solver;
   double period = tick->facts.period;
   step_begin(tick);
+  if (pointers->pushes) {
+    const hapi_own_pushing at = hapi_tick_pushing(tick);
+    hapi_own_push(&at);
+  }
   rows_make(tick);
   rows_solve(&tick->rows, &tick->sample);
   bool again = rows_stop_push_out(&tick->rows);
@@ -511,6 +515,10 @@ void hapi_contact_step(hapi_tick *tick)
     hapi_effect_end(&tick->sample, HAP_EFFECT_PROXY, begin);
   }
   rows_account(&tick->rows, &tick->bodies, &tick->contacts, &tick->joints, tick->facts.observes);
+  if (pointers->pushes) {
+    const hapi_own_pushing at = hapi_tick_pushing(tick);
+    hapi_own_push_account(&at);
+  }
   if (tick->joints.told > 0) {
     hapi_joints_tell(&tick->joints, &tick->bodies, &tick->rows, period);
   }

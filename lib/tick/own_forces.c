@@ -7,6 +7,7 @@
 #include "base/assert.h"
 #include "base/safety.h"
 #include "base/vec.h"
+#include "local/rows.h"
 #include "pointer/own_force.h"
 
 /* A force that is added comes in with a share that grows. One that is changed or removed must not
@@ -61,33 +62,121 @@ void hapi_own_force_change(hapi_own_force *own, const hapi_force_setup *setup, c
   own->out = HAP_FORCE_IN;
 }
 
+/* ---- bound to a body ---- */
+
+/* On the body, about its centre: what is opposite to a wrench on the hand. */
+static void bond_push(const hapi_local_body *body, const hapi_pointer *p, const hap_wrench *wrench,
+                      double out[6])
+{
+  double arm[3];
+  double moment[3];
+  hapi_v3_sub(p->handle.position, body->pose.position, arm);
+  hapi_v3_cross(arm, wrench->force, moment);
+  hapi_v3_add(moment, wrench->torque, moment);
+  hapi_v3_scale(-1.0, wrench->force, out);
+  hapi_v3_scale(-1.0, moment, out + 3);
+}
+
+/* NULL: it is not in the local model. */
+static const hapi_local_body *bond_find(hapi_own_force *own, const hapi_bodies *bodies)
+{
+  const hapi_local_body *body = &bodies->of[own->bond.slot];
+  if (body->live && body->given.birth == own->setup.body) {
+    return body;
+  }
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    own->bond.slot = bodies->live[i];
+    if (bodies->of[own->bond.slot].given.birth == own->setup.body) {
+      return &bodies->of[own->bond.slot];
+    }
+  }
+  own->bond.slot = 0;
+  return NULL;
+}
+
+/* A body that is put elsewhere, or that goes, takes no force along in one step. Bodies of other
+ * models than these have no motion of their own in the loop: a force would leap at each sync. */
+static const hapi_local_body *bond_follow(hapi_own_force *own, const hapi_bodies *bodies,
+                                          const hapi_tick_facts *facts)
+{
+  hapi_own_bond *bond = &own->bond;
+  bool can = facts->model == HAP_MODEL_CONTACT || facts->model == HAP_MODEL_SINGLE;
+  const hapi_local_body *body = can && own->setup.body != 0 ? bond_find(own, bodies) : NULL;
+  if (bond->here && (body == NULL || body->epoch != bond->epoch)) {
+    own_part(own);
+  }
+  if (!bond->here && own->setup.body != 0) {
+    own->share = 0.0; /* it begins when the body is there */
+  }
+  bond->here = body != NULL;
+  bond->epoch = body != NULL ? body->epoch : 0;
+  return body;
+}
+
+/* The body answers to a force in the next tick. A spring or damper is stable as long as that does
+ * not turn the way about: k dt^2 + 2 d dt within the mass that the force meets. What a light body
+ * cannot hold is cut, for both. */
+static double bond_share(const hapi_own_force *own, const hapi_local_body *body,
+                         const hapi_pointer *p, const hap_wrench *wrench, double period)
+{
+  double push[6];
+  double answer[6];
+  double force = hapi_v3_norm(wrench->force);
+  if (force == 0.0 || !hapi_body_responds(body)) {
+    return 1.0;
+  }
+  bond_push(body, p, wrench, push);
+  hapi_row_response(body, push, answer);
+  double gives = hapi_dot6(push, answer) / (force * force); /* 1/kg */
+  double hard =
+      (hapi_own_force_stiffness(&own->setup) * period + 2.0 * hapi_own_force_damping(&own->setup)) *
+      period * gives;
+  return hard > HAPI_SAFETY_OWN_ANSWER ? HAPI_SAFETY_OWN_ANSWER / hard : 1.0;
+}
+
+/* ---- one of them ---- */
+
 /* What the setup comes to, without what a change has left. True: a call gave more than is
- * promised. */
-static bool own_value(hapi_own_force *own, const hapi_pointer *p, int64_t now_ns, double seconds,
-                      hap_wrench *out)
+ * promised, or a body could not hold it. */
+static bool own_value(hapi_own_force *own, const hapi_pointer *p, const hapi_local_body *body,
+                      const hapi_tick_facts *facts, hap_wrench *out)
 {
   const hapi_force_setup *setup = &own->setup;
-  if (own->leaves || own->out != HAP_FORCE_IN) {
+  if (own->leaves || own->out != HAP_FORCE_IN || (setup->body != 0 && body == NULL)) {
     *out = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
     return false;
   }
-  double in = setup->fade_in_s > 0.0 ? seconds / setup->fade_in_s : 1.0;
+  double in = setup->fade_in_s > 0.0 ? facts->period / setup->fade_in_s : 1.0;
   own->share = hapi_min(own->share + in, 1.0);
-  const hapi_own_source source = {setup, own->samples, &own->called};
-  hapi_own_force_value(&source, p, 1e-9 * (double)(now_ns - own->begin_ns), out);
+  hapi_own_frame frame;
+  if (body != NULL) {
+    frame = (hapi_own_frame){body->pose, body->twist};
+  }
+  const hapi_own_source source = {setup, body != NULL ? &frame : NULL, own->samples, &own->called};
+  hapi_own_force_value(&source, p, 1e-9 * (double)(facts->now_ns - own->begin_ns), out);
   hapi_v3_scale(own->share, out->force, out->force);
   hapi_v3_scale(own->share, out->torque, out->torque);
   bool force = hapi_v3_shorten(out->force, setup->max_force);
   bool torque = hapi_v3_shorten(out->torque, setup->max_torque);
-  return (force || torque) && setup->kind == HAP_FORCE_CALL;
+  double holds = body != NULL && facts->model == HAP_MODEL_CONTACT
+                     ? bond_share(own, body, p, out, facts->period)
+                     : 1.0;
+  if (holds < 1.0) {
+    hapi_v3_scale(holds, out->force, out->force);
+    hapi_v3_scale(holds, out->torque, out->torque);
+  }
+  return holds < 1.0 || ((force || torque) && setup->kind == HAP_FORCE_CALL);
 }
 
 /* True: it was more than is promised. */
-static bool own_run(hapi_own_force *own, const hapi_pointer *p, int64_t now_ns, double seconds,
-                    hap_wrench *out)
+static bool own_run(hapi_own_force *own, const hapi_pointer *p, const hapi_bodies *bodies,
+                    const hapi_tick_facts *facts, hap_wrench *out)
 {
   const hapi_force_setup *setup = &own->setup;
-  bool beyond = own_value(own, p, now_ns, seconds, out);
+  double seconds = facts->period;
+  const hapi_local_body *body =
+      setup->body != 0 || own->bond.here ? bond_follow(own, bodies, facts) : NULL;
+  bool beyond = own_value(own, p, body, facts, out);
   if (own->changed) {
     hapi_v3_sub(own->gives.force, out->force, own->offset.force);
     hapi_v3_sub(own->gives.torque, out->torque, own->offset.torque);
@@ -105,19 +194,24 @@ static bool own_run(hapi_own_force *own, const hapi_pointer *p, int64_t now_ns, 
                                 setup->max_power};
   bool more = hapi_promise_keep(&promise, &own->purse, &p->declared, seconds, out);
   own->gives = *out;
+  if (body != NULL) {
+    bond_push(body, p, out, own->bond.push);
+  }
   return more || beyond;
 }
 
-void hapi_own_forces_declare(hapi_own_force *forces, hapi_pointer *pointer, int64_t now_ns,
-                             double seconds)
+bool hapi_own_forces_declare(hapi_own_force *forces, hapi_pointer *pointer,
+                             const hapi_bodies *bodies, const hapi_tick_facts *facts)
 {
+  bool pushes = false;
   for (uint32_t i = 0; i < HAP_FORCES_MAX; ++i) {
     hapi_own_force *own = &forces[i];
     hap_wrench wrench;
     if (own->setup.serial == 0) {
       continue;
     }
-    bool more = own_run(own, pointer, now_ns, seconds, &wrench);
+    bool more = own_run(own, pointer, bodies, facts, &wrench);
+    pushes = pushes || own->bond.here;
     pointer->declared.held = pointer->declared.held || more;
     if (hapi_own_force_follows(&own->setup)) {
       hapi_declare_following(&pointer->declared, &wrench, hapi_own_force_stiffness(&own->setup));
@@ -128,6 +222,18 @@ void hapi_own_forces_declare(hapi_own_force *forces, hapi_pointer *pointer, int6
       *own = (hapi_own_force){.leaves = false};
     }
   }
+  return pushes;
+}
+
+uint32_t hapi_own_forces_bound(const hapi_own_force *forces, uint64_t out[HAP_FORCES_MAX])
+{
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < HAP_FORCES_MAX; ++i) {
+    if (forces[i].setup.serial != 0 && forces[i].setup.body != 0) {
+      out[count++] = forces[i].setup.body;
+    }
+  }
+  return count;
 }
 
 void hapi_own_forces_rest(hapi_own_force *forces)
@@ -139,6 +245,7 @@ void hapi_own_forces_rest(hapi_own_force *forces)
     }
     memset(&own->gives, 0, sizeof own->gives);
     memset(&own->purse.last, 0, sizeof own->purse.last);
+    memset(&own->bond, 0, sizeof own->bond);
     own->offset_left = 0.0;
   }
 }

@@ -10,7 +10,17 @@
 
 #include "base/force_setup.h"
 #include "guard/promise.h"
+#include "local/body.h"
+#include "local/facts.h"
 #include "pointer/pointer.h"
+
+/* To the body of setup.body. */
+typedef struct hapi_own_bond {
+  bool here; /* the body was in the local model, in the last tick */
+  uint32_t slot;
+  uint32_t epoch;
+  double push[6]; /* N, N m, of this tick: on the body, about its centre */
+} hapi_own_bond;
 
 /* One of a pointer. Zeroed: no force is here. */
 typedef struct hapi_own_force {
@@ -27,6 +37,7 @@ typedef struct hapi_own_force {
   hap_wrench offset;
   double offset_left;
   hapi_promise before; /* what it gave when it was changed */
+  hapi_own_bond bond;
   hapi_purse purse;
 } hapi_own_force;
 
@@ -42,9 +53,12 @@ void hapi_own_force_called(hapi_own_force *own, const hap_wrench *wrench, uint32
 bool hapi_own_force_calls(const hapi_own_force *own);
 
 /* Once a tick, after the devices were read: adds the forces of a pointer to what is declared.
- * forces: HAP_FORCES_MAX. */
-void hapi_own_forces_declare(hapi_own_force *forces, hapi_pointer *pointer, int64_t now_ns,
-                             double seconds);
+ * forces: HAP_FORCES_MAX. True: a body is pushed back. */
+bool hapi_own_forces_declare(hapi_own_force *forces, hapi_pointer *pointer,
+                             const hapi_bodies *bodies, const hapi_tick_facts *facts);
+
+/* Births of the bodies to which forces are bound; how many. */
+uint32_t hapi_own_forces_bound(const hapi_own_force *forces, uint64_t out[HAP_FORCES_MAX]);
 
 /* In place of it while a fault is latched: no force acts, and what was removed is gone. */
 void hapi_own_forces_rest(hapi_own_force *forces);

@@ -132,8 +132,9 @@ static uint32_t report_sides(const hapi_tool_world *w, hapi_tool_side *out)
 }
 
 /* The places of those that have not come yet were cleared at start. */
-static void report_pointers(const hapi_pointers *from, hapi_state *out)
+static void report_pointers(const hapi_tick *tick, hapi_state *out)
 {
+  const hapi_pointers *from = &tick->pointers;
   hapi_state_pointer *pointers = hapi_state_pointers(out);
   for (uint32_t i = 0; i < from->high; ++i) {
     const hapi_pointer *in = &from->of[i];
@@ -151,6 +152,9 @@ static void report_pointers(const hapi_pointers *from, hapi_state *out)
     pointers[i].twist = in->twist;
     pointers[i].is_tool = in->shape.hull != NULL;
     pointers[i].extent = in->shape.extent;
+    pointers[i].bound_count =
+        in->own ? hapi_own_forces_bound(&tick->own[(size_t)i * HAP_FORCES_MAX], pointers[i].bound)
+                : 0;
     if (in->shape.hull != NULL) {
       hapi_state_hulls(out)[i] = *in->shape.hull;
     }
@@ -169,7 +173,7 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   report_contacts(&tick->touches, &tick->pointers, &tick->bodies, out);
   report_springs(&tick->touches, tick->facts.tick, out);
   report_joints(&tick->joints, out);
-  report_pointers(&tick->pointers, out);
+  report_pointers(tick, out);
   out->tick = tick->facts.tick;
   out->side_count = report_sides(&tick->touches.tool, hapi_state_sides(out));
 }

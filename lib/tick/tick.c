@@ -77,7 +77,7 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->facts =
       (hapi_tick_facts){.period = tick->facts.period, .observes = true, .time_scale = 1.0};
   tick->pointers.high = tick->capacity.pointers;
-  tick->pointers.proxies = false;
+  tick->pointers.proxies = tick->pointers.pushes = false;
   tick->bodies = (hapi_bodies){
       .of = tick->bodies.of, .courses = tick->bodies.courses, .live = tick->bodies.live};
   touches->count = touches->pushing = 0;
@@ -143,6 +143,10 @@ static __attribute__((noinline)) void paper_step(hapi_tick *tick)
   hapi_local_place(&tick->bodies, &tick->facts);
   hapi_render(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->sample);
   hapi_local_step(&tick->bodies, &tick->touches, &tick->facts, &tick->sample);
+  if (tick->pointers.pushes) {
+    const hapi_own_pushing at = hapi_tick_pushing(tick);
+    hapi_own_push_world(&at);
+  }
   if (tick->bodies.unsound) {
     hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
   }
@@ -171,6 +175,7 @@ void hapi_tick_guard(hapi_tick *tick)
 
 static void own_forces(hapi_tick *tick)
 {
+  tick->pointers.pushes = false;
   for (uint32_t i = 0; i < tick->pointers.high; ++i) {
     hapi_pointer *p = &tick->pointers.of[i];
     hapi_own_force *own = &tick->own[(size_t)i * HAP_FORCES_MAX];
@@ -180,7 +185,8 @@ static void own_forces(hapi_tick *tick)
     if (tick->facts.faulted) {
       hapi_own_forces_rest(own);
     } else {
-      hapi_own_forces_declare(own, p, tick->facts.now_ns, tick->facts.period);
+      bool pushes = hapi_own_forces_declare(own, p, &tick->bodies, &tick->facts);
+      tick->pointers.pushes = tick->pointers.pushes || pushes;
     }
     p->own = hapi_own_forces_any(own);
   }

@@ -34,6 +34,7 @@
 #include "sync/messages.h"
 #include "tick/outputs.h"
 #include "tick/own_forces.h"
+#include "tick/own_push.h"
 
 /* What the trace shows besides the pointers. */
 typedef struct hapi_tick_watch {
@@ -97,5 +98,15 @@ void hapi_tick_read(hapi_tick *tick, int64_t now_ns); /* devices -> pointers */
 void hapi_tick_answer(hapi_tick *tick);               /* pointers -> devices */
 void hapi_contact_step(hapi_tick *tick);              /* model CONTACT */
 void hapi_tick_guard(hapi_tick *tick);                /* world wrenches -> device wrenches */
+
+static inline hapi_own_pushing hapi_tick_pushing(hapi_tick *tick)
+{
+  return (hapi_own_pushing){.facts = &tick->facts,
+                            .pointers = &tick->pointers,
+                            .own = tick->own,
+                            .bodies = &tick->bodies,
+                            .touches = &tick->touches,
+                            .rows = &tick->rows};
+}
 
 #endif

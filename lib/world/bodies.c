@@ -19,6 +19,16 @@ uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body)
   return hapi_index_get(&table->by_address, hapi_index_address(body));
 }
 
+uint32_t hapi_bodies_find_birth(const hapi_body_table *table, uint64_t birth)
+{
+  for (uint32_t i = 0; i < table->high; ++i) {
+    if (table->entries[i].body != NULL && table->rests[i].birth == birth) {
+      return i;
+    }
+  }
+  return HAPI_NONE;
+}
+
 static hap_status table_grow(hapi_body_table *table, uint32_t capacity)
 {
   const hapi_world_listener *listener = table->listener;

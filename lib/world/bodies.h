@@ -137,6 +137,8 @@ typedef struct hapi_body_table {
 hap_status hapi_bodies_init(hapi_body_table *table, const hapi_world_listener *listener);
 void hapi_bodies_finish(hapi_body_table *table);
 uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_NONE */
+/* By the birth of its entry; HAPI_NONE: it is gone. */
+uint32_t hapi_bodies_find_birth(const hapi_body_table *table, uint64_t birth);
 /* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. syncs: once in a
  * cycle, when what the application has moved counts. */
 hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle, bool syncs);
