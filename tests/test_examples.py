@@ -30,6 +30,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "grip_and_feel": "docs/grippers.md",
     "two_fingers": "docs/fingers.md",
     "trigger_volume": "docs/force-calls.md",
+    "drawer_with_detents": "docs/body-forces.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -188,6 +189,16 @@ def check_trigger_volume(program):
     rows = rows_of(run(program), r"^(inside|outside), entered ([0-9]+) times$")
     point(len(rows) == 12 and {row[0] for row in rows} == {"inside", "outside"} and
           rows[-1][1] == "2", "the hand goes through the volume twice", str(rows))
+
+
+def check_drawer_with_detents(program):
+    rows = rows_of(run(program),
+                   r"^hand +(-?[0-9.]+) mm out, drawer +(-?[0-9.]+) mm: +(-?[0-9.]+) N$")
+    off = [float(row[0]) - float(row[1]) for row in rows]
+    point(len(rows) == 12 and float(rows[-1][1]) > 90.0 and max(map(abs, off)) < 8.0,
+          "the drawer comes along", str(rows))
+    point(any(float(row[2]) < -0.5 for row in rows) and any(float(row[2]) > 0.5 for row in rows),
+          "the detents hold and let go", str(rows))
 
 
 def check_push_without_ode(program):
