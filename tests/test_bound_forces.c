@@ -337,7 +337,7 @@ TEST(a_kinematic_body_takes_the_place_along_and_is_not_pushed)
 
 TEST(a_magnet_wakes_a_body_at_rest)
 {
-  desk *d = desk_new(-9.81, HAP_MODEL_CONTACT);
+  desk *d = desk_new(9.81, HAP_MODEL_CONTACT);
   floor_add(d);
   dBodyID ball = ode_ball(d->world, d->space, MASS, BALL, (const double[3]){0.0, 0.0, BALL});
   desk_run(d, 0.3, 0.0, 0.1);

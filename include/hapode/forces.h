@@ -139,7 +139,8 @@ typedef struct hap_force_def {
   double max_force;  /* N, 0..1e6 */
   double max_torque; /* N m, 0..1e6 */
   /* W, 0..1e6: energy that it gives to the hand, as a mean over 0.1 s. HAP_FORCE_POWER_AUTO
-   * (default): 0 for VISCOUS, which takes energy alone; for others the largest force at 1 m/s. */
+   * (default): 0 for VISCOUS that is bound to no body, which takes energy alone; for others the
+   * largest force at 1 m/s. */
   double max_power;
 
   hap_force_call call; /* CALL; NULL (default) for other kinds */
