@@ -642,6 +642,30 @@ TEST(what_a_device_cannot_hold_is_cut_and_said)
   hap_device_close(device);
 }
 
+TEST(a_spring_on_a_device_without_figures_is_as_stiff_as_contacts)
+{
+  hap_detail why = {""};
+  hap_force_id id = {0};
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  hap_device *device = NULL;
+  REQUIRE(hap_device_open("virtual:path=0:0.004/0/0;9:0.004/0/0", &device, &why) >= HAP_OK);
+  d->hand_def.device = device;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  session_run(d->session);
+  hap_force_def spring = force_of(HAP_FORCE_SPRING);
+  spring.stiffness = STIFFNESS;
+  CHECK(hap_pointer_force_add(d->session, d->hand, &spring, &id) == HAP_OK);
+  spring.stiffness = 2.0 * STIFFNESS;
+  CHECK(hap_pointer_force_set(d->session, d->hand, id, &spring) == HAP_SATURATED);
+  detail_has(d, "1000");
+  REQUIRE(hap_session_advance(d->session, 60) >= HAP_OK);
+  CHECK_NEAR(state_of(d).wrench.force[0], -0.004 * STIFFNESS, EXACT);
+  hap_session_destroy(d->session);
+  d->session = NULL;
+  hap_device_close(device);
+}
+
 /* ---- recordings ---- */
 
 static void forced_session(desk *d)

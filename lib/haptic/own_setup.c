@@ -11,7 +11,9 @@
 /* What the application says of own forces: cut to what the device can hold, promises filled in, and
  * into the pointer's list. */
 
-/* What the device can hold: of a spring as of a proxy's. Of a damper see pointer/own_force.c: the
+/* What the device can hold: of a spring as of a proxy's. Of a device without figures nobody knows:
+ * the stiffness of the pointer is what the application has chosen for it. A pointer without a device
+ * has nothing that could swing. Of a damper see pointer/own_force.c: the
  * velocity is old by half a tick, by the device's delay, and by a tick where it is estimated. World
  * units: a newton is force_scale newtons of the device. */
 static hap_status setup_bound(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
@@ -23,7 +25,8 @@ static hap_status setup_bound(const hapi_haptic *haptic, const hapi_pointer_slot
   double mass = slot->info.mass > 0.0 ? slot->info.mass : HAPI_SAFETY_OWN_MASS;
   double age = (slot->info.measures_velocity != 0 ? 0.5 : 1.5) * period + slot->info.delay;
   double damping = HAPI_SAFETY_OWN_DAMPING * mass / (age * scale);
-  double stiffness = gains.known ? gains.stiffness / scale : HUGE_VAL;
+  double unknown = slot->has_device ? slot->def.stiffness : HUGE_VAL;
+  double stiffness = gains.known ? gains.stiffness / scale : unknown;
   hap_status status = HAP_OK;
   if (scale > 0.0 && io->damping > damping) {
     status =
