@@ -30,6 +30,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "grip_and_feel": "docs/grippers.md",
     "two_fingers": "docs/fingers.md",
     "trigger_volume": "docs/force-calls.md",
+    "follow_a_path": "docs/force-calls.md",
     "drawer_with_detents": "docs/body-forces.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
@@ -189,6 +190,13 @@ def check_trigger_volume(program):
     rows = rows_of(run(program), r"^(inside|outside), entered ([0-9]+) times$")
     point(len(rows) == 12 and {row[0] for row in rows} == {"inside", "outside"} and
           rows[-1][1] == "2", "the hand goes through the volume twice", str(rows))
+
+
+def check_follow_a_path(program):
+    rows = rows_of(run(program), r"^ *\d+ ms: at +(-?[0-9.]+) +(-?[0-9.]+) mm, +(\d+) % of the way, "
+                                 r"+([0-9.]+) mm off$")
+    point(len(rows) == 10 and int(rows[-1][2]) >= 99, "the pupil comes to the end", str(rows))
+    point(all(float(row[3]) < 3.0 for row in rows), "and stays near the way", str(rows))
 
 
 def check_drawer_with_detents(program):
