@@ -12,6 +12,7 @@
 #include <hapode/effects.h>
 #include <hapode/expert.h>
 #include <hapode/forces.h>
+#include <hapode/grab.h>
 #include <hapode/hooks.h>
 #include <hapode/identify.h>
 #include <hapode/outputs.h>

@@ -205,6 +205,7 @@ typedef struct hap_pointer_state {
   double axes[HAP_AXES_MAX];
   double axis_rates[HAP_AXES_MAX];  /* of those, a second */
   double axis_forces[HAP_AXES_MAX]; /* what was written to the device (outputs.h) */
+  void *held; /* dBodyID, to be compared: what the pointer holds (grab.h); NULL: nothing */
 } hap_pointer_state;
 
 /* [any] State after the newest tick. size_of_out: sizeof *out of the caller's build.

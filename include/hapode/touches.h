@@ -91,20 +91,23 @@ typedef enum hap_event_kind {
   HAP_EVENT_FAULT = 7,     /* the guard has taken the force away */
   /* A gripper has closed or opened: see hap_pointer_outputs.gripper_closed. It begins open. */
   HAP_EVENT_GRIPPER = 8,
-  HAP_EVENT_FORCE_OUT = 10 /* the call of an own force was taken out (forces.h) */
+  HAP_EVENT_FORCE_OUT = 10, /* the call of an own force was taken out (forces.h) */
+  HAP_EVENT_HOLD = 11,  /* the pointer holds a body (grab.h) */
+  HAP_EVENT_LET_GO = 12 /* it does no more */
 } hap_event_kind;
 
 /* Something that has happened. Its size goes with the call; it may grow at its end. What a kind
  * does not have is 0. */
 typedef struct hap_event {
   uint32_t kind;          /* hap_event_kind */
-  /* BUTTON, GRIPPER (its axis): from 0; FAULT: hap_fault; FORCE_OUT: hap_force_out */
+  /* BUTTON, GRIPPER (its axis): from 0; FAULT: hap_fault; FORCE_OUT: hap_force_out;
+   * LET_GO: hap_grab_end */
   uint32_t number;
   int64_t time_ns;        /* of the tick, on the clock of hap_session_now */
   hap_pointer_id pointer; /* FAULT: v is 0 where it came from none */
-  void *geom;             /* as in hap_touch; NULL for BUTTON, FAULT and GRIPPER */
+  void *geom;             /* as in hap_touch; NULL for BUTTON and all kinds behind it */
   void *body;
-  double point[3];  /* m, world */
+  double point[3];  /* m, world; HOLD, LET_GO: of the pointer */
   double normal[3]; /* unit, world, out of the geom */
   /* m/s. TOUCH, IMPACT: at which they closed; SLIDE: along the surface. GRIPPER: rate of its axis,
    * in the unit of the axis a second */

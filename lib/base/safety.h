@@ -72,6 +72,11 @@
 #define HAPI_SAFETY_TEXTURE_HEIGHT 0.003    /* m */
 #define HAPI_SAFETY_IMPACT_FORCE 5.0        /* N */
 
+/* ---- a grip ---- */
+#define HAPI_SAFETY_GRAB_SPEED 0.5  /* m/s */
+#define HAPI_SAFETY_GRAB_SPIN 5.0   /* rad/s */
+#define HAPI_SAFETY_GRAB_WAIT_S 1.0 /* s */
+
 /* ---- energy ---- */
 #define HAPI_SAFETY_OVERDRAFT 0.006      /* 1 */
 #define HAPI_SAFETY_OVERDRAFT_LEAST 1e-5 /* J */

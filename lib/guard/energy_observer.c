@@ -6,6 +6,7 @@
 
 #include "base/safety.h"
 #include "base/vec.h"
+#include "local/grab_rows.h"
 #include "local/pointer_friction.h"
 #include "local/touch_feel.h"
 
@@ -25,6 +26,7 @@
  *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the
  *            stiffness of a spring under load: the world's work, to either side. The energy in the
  *            spring of a contact that is no more is lost.
+ *   grips    as the springs of contacts; a place that moves in the body is the world's work.
  *   base     the motion of a device's frame in the world, and a stiffness that is set, are the
  *            world's work: to either side.
  *   gaps     Over missed ticks the hand goes the whole way against the force that was held: that is
@@ -134,6 +136,14 @@ static double work_on(double period, const hapi_local_body *body, const hapi_loc
   return 0.5 * period * (after + before);
 }
 
+/* J in the spring of a grip. */
+static double grip_energy(const hapi_pointer *p)
+{
+  const hapi_grab_pull *pull = &p->grab.pull;
+  return 0.5 * (pull->stiffness * hapi_v3_dot(pull->way, pull->way) +
+                pull->turn_stiffness * hapi_v3_dot(pull->turn, pull->turn));
+}
+
 static double half_compliance(const hapi_pointer *p)
 {
   return p->surface.stiffness > 0.0 ? 0.5 / p->surface.stiffness : 0.0;
@@ -143,6 +153,26 @@ static double half_compliance(const hapi_pointer *p)
 static double hand_gets(const hapi_pointer *p)
 {
   return (1.0 - p->guard.late_loss) * (1.0 - p->guard.swings.taken);
+}
+
+/* The same of the bodies that are held. */
+static double held_give(const hapi_tick_facts *facts, const hapi_pointers *pointers,
+                        const hapi_bodies *bodies, double *io_stored)
+{
+  double sum = 0.0;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
+    const hapi_grab *g = &p->grab;
+    if (p->generation == 0 || !hapi_grab_acts(g)) {
+      continue;
+    }
+    const hapi_local_body *body = &bodies->of[g->hold.body];
+    double felt = p->guard.felt * hand_gets(p);
+    double power = hapi_grab_power(g, body, true);
+    *io_stored += grip_energy(p);
+    sum += facts->period * power * (hapi_body_is_owned(body) ? felt - 1.0 : 1.0);
+  }
+  return sum;
 }
 
 /* J that bodies of given motion do on the pointers' springs in this tick. */
@@ -162,6 +192,7 @@ static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *p
     }
     return sum;
   }
+  sum += pointers->grabs ? held_give(facts, pointers, bodies, io_stored) : 0.0;
   for (uint32_t i = 0; i < touches->count; ++i) {
     const hapi_local_contact *c = &touches->of[i];
     const hapi_pointer *p = &pointers->of[c->pointer];
@@ -191,6 +222,30 @@ static double spring_energy(const hapi_pointer *p, double k, double depth)
   }
   return force <= p->guard.limit ? 0.5 * force * depth
                                  : p->guard.limit * (depth - 0.5 * p->guard.limit / k);
+}
+
+/* J that fading, and places that move, added to the springs of grips in this tick. */
+static double grips_give(hapi_guard *guard, const hapi_pointers *pointers, double *io_gone)
+{
+  double sum = 0.0;
+  for (uint32_t i = 0; i < pointers->high; ++i) {
+    const hapi_pointer *p = &pointers->of[i];
+    hapi_grab_ledger *ledger = &pointers->of[i].grab.ledger;
+    if (p->generation == 0 || !hapi_grab_acts(&p->grab)) {
+      continue;
+    }
+    double felt = p->grab.share * p->guard.felt;
+    double energy = p->guard.felt * grip_energy(p);
+    *io_gone -= ledger->sprung;
+    sum += p->guard.felt * ledger->moved;
+    if (felt != ledger->felt) {
+      sum += felt > 0.0 ? energy * (1.0 - ledger->felt / felt) : -ledger->sprung;
+    }
+    ledger->felt = felt;
+    ledger->sprung = energy;
+    guard->sprung += energy;
+  }
+  return sum;
 }
 
 /* J that ramps and fading added to the springs in this tick. */
@@ -237,6 +292,7 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     r->sprung = energy + p->guard.felt * rubs;
     guard->sprung += r->sprung;
   }
+  sum += pointers->grabs ? grips_give(guard, pointers, &gone) : 0.0;
   return sum - gone;
 }
 

@@ -107,18 +107,38 @@ static bool vector_slew(const double before[3], double step, double v[3])
   return true;
 }
 
+/* To the third order of the turn of a tick. */
+static void turn_follow(hapi_pointer *p)
+{
+  hapi_guard_pointer *g = &p->guard;
+  double back[4] = {g->quat[0], -g->quat[1], -g->quat[2], -g->quat[3]};
+  double q[4];
+  hapi_quat_multiply(p->device.pose.quat_wxyz, back, q);
+  hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, g->turned);
+  memcpy(g->quat, p->device.pose.quat_wxyz, sizeof g->quat);
+}
+
+/* Of a sphere that holds a body; nobody follows a free one. */
+static __attribute__((noinline, cold)) void turn_follow_held(hapi_pointer *p)
+{
+  bool turns = hapi_grab_turns(&p->grab);
+  turn_follow(p);
+  if (!turns || !p->grab.ledger.turns) {
+    hapi_v3_set(p->guard.turned, 0.0, 0.0, 0.0);
+  }
+  p->grab.ledger.turns = turns;
+}
+
 /* The way that the device went since the last tick. */
 static void way_follow(hapi_pointer *p)
 {
   hapi_guard_pointer *g = &p->guard;
   hapi_v3_sub(p->device.pose.position, g->position, g->moved);
   hapi_v3_copy(p->device.pose.position, g->position);
-  if (p->shape.hull != NULL) { /* to the third order of the turn of a tick; of a sphere none */
-    double back[4] = {g->quat[0], -g->quat[1], -g->quat[2], -g->quat[3]};
-    double q[4];
-    hapi_quat_multiply(p->device.pose.quat_wxyz, back, q);
-    hapi_v3_scale(q[0] < 0.0 ? -2.0 : 2.0, q + 1, g->turned);
-    memcpy(g->quat, p->device.pose.quat_wxyz, sizeof g->quat);
+  if (p->shape.hull != NULL) {
+    turn_follow(p);
+  } else if (p->grab.ledger.turns || hapi_grab_turns(&p->grab)) {
+    turn_follow_held(p);
   }
   if (!g->placed) {
     hapi_v3_set(g->moved, 0.0, 0.0, 0.0);
@@ -196,7 +216,9 @@ static void limit_unexplained(const hapi_tick_facts *facts, hapi_pointer *p)
     }
     double arm = hapi_max(HAPI_SAFETY_HANDLE, p->shape.extent / p->device.motion_scale);
     g->change.most_force = explained + slow * p->device.limits.max_force;
-    g->change.most_torque = arm * explained + slow * p->device.limits.max_torque;
+    g->change.most_torque = arm * explained +
+                            g->change.explained.torque * hapi_coupling_torque_scale(p) +
+                            slow * p->device.limits.max_torque;
     bool force = vector_slew(g->change.came.force, g->change.most_force, p->device.wrench.force);
     bool torque =
         vector_slew(g->change.came.torque, g->change.most_torque, p->device.wrench.torque);

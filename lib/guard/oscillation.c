@@ -6,6 +6,7 @@
 #include "base/vec.h"
 #include "guard/force_guard.h"
 #include "guard/runaway.h"
+#include "local/grab_rows.h"
 #include "pointer/coupling.h"
 
 /* A spring whose force comes late by d makes the energy pi w d k X^2 in a cycle. Where device and
@@ -53,6 +54,10 @@ static void note_given(const hapi_tick_facts *facts, const hapi_pointers *pointe
       p->guard.swings.given += facts->period * p->guard.power;
     }
     p->guard.swings.given += p->declared.work;
+    if (facts->model == HAP_MODEL_CONTACT && p->generation != 0 && hapi_grab_acts(&p->grab)) {
+      const hapi_local_body *body = &bodies->of[p->grab.hold.body];
+      p->guard.swings.given += facts->period * hapi_grab_power(&p->grab, body, false);
+    }
   }
   for (uint32_t i = 0; facts->model == HAP_MODEL_CONTACT && i < touches->count; ++i) {
     const hapi_local_contact *c = &touches->of[i];
@@ -208,7 +213,16 @@ static double stiffness_felt(const hapi_pointer *p)
 {
   double touched = p->proxied ? p->coupling.stiffness
                               : hapi_pointer_stiffest(p) * hapi_max((double)p->contacts, 1.0);
-  return touched + p->declared.stiffness;
+  double held = p->proxied || !hapi_grab_acts(&p->grab) ? 0.0 : p->grab.pull.stiffness;
+  return touched + held + p->declared.stiffness;
+}
+
+/* N m/rad, likewise. touched: of what is touched with the hull. */
+static double turn_stiffness_felt(const hapi_pointer *p, double touched)
+{
+  return p->proxied && p->shape.hull != NULL
+             ? p->coupling.spin_stiffness
+             : touched + (hapi_grab_turns(&p->grab) ? p->grab.pull.turn_stiffness : 0.0);
 }
 
 static bool axes_follow(hapi_swings *swings, hapi_swing_axis axes[AXES], const double force[3],
@@ -242,7 +256,7 @@ static bool pointer_swings(hapi_pointer *p, const hap_wrench *felt, const double
                            double seconds)
 {
   hapi_swings *s = &p->guard.swings;
-  bool turns = p->shape.hull != NULL && p->device.feels_torque;
+  bool turns = (p->shape.hull != NULL && p->device.feels_torque) || hapi_grab_turns(&p->grab);
   double stiffness = stiffness_felt(p);
   double arm2 = p->shape.extent * p->shape.extent; /* no contact has a longer one */
   double way[3];                                   /* of the hand in its base */
@@ -253,8 +267,8 @@ static bool pointer_swings(hapi_pointer *p, const hap_wrench *felt, const double
   if (turns) {
     hapi_v3_sub(p->handle.spin, p->frame.carries.angular, spin);
     hapi_v3_madd(s->turned, seconds, spin, s->turned);
-    axes_hear(s, s->torque, felt->torque, s->turned,
-              p->proxied ? p->coupling.spin_stiffness : arm2 * stiffness, seconds);
+    axes_hear(s, s->torque, felt->torque, s->turned, turn_stiffness_felt(p, arm2 * stiffness),
+              seconds);
   }
   if (p->device.jumped || (p->guard.flags & OTHER_REASONS) != 0) { /* the way is not the force's */
     for (int i = 0; i < AXES; ++i) {

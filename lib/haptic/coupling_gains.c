@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "base/safety.h"
+
 #define MARGIN 0.8        /* of the stiffness at which damping is used up */
 #define DAMPING_SHARE 0.5 /* of what the stiffness leaves */
 
@@ -43,4 +45,11 @@ hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
     return (hapi_coupling_gains){false, HUGE_VAL, 0.0};
   }
   return (hapi_coupling_gains){true, k, DAMPING_SHARE * fmax(0.0, b - k * late)};
+}
+
+double hapi_device_damping(const hap_device_info *device, double period, double scale)
+{
+  double mass = device->mass > 0.0 ? device->mass : HAPI_SAFETY_OWN_MASS;
+  double age = (device->measures_velocity != 0 ? 0.5 : 1.5) * period + device->delay;
+  return HAPI_SAFETY_OWN_DAMPING * mass / (age * scale);
 }

@@ -27,4 +27,9 @@ static inline bool hapi_coupling_has_spring(hap_coupling coupling)
 hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
                                            const hapi_pointer_setup *pointer, double period);
 
+/* N s/m, of a damper that acts by old velocities: by half a tick, by the device's delay, and by a
+ * tick where they are estimated (pointer/own_force.c). scale: N/m of the device by one of the
+ * world, above 0. */
+double hapi_device_damping(const hap_device_info *device, double period, double scale);
+
 #endif

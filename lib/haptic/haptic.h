@@ -17,6 +17,7 @@
 #include <hapode/trace.h>
 
 #include "base/force_setup.h"
+#include "base/grab_setup.h"
 #include "base/pointer_setup.h"
 #include "haptic/own_list.h"
 #include "record/tape.h"
@@ -105,6 +106,11 @@ hap_status hapi_haptic_remove_force(hapi_haptic *haptic, hap_pointer_id id, hap_
                                     hap_detail *detail);
 hap_status hapi_haptic_get_force(hapi_haptic *haptic, hap_pointer_id id, hap_force_id force,
                                  hap_force_state *out);
+
+/* [any] grab.h. birth 0: what is held is let go. HAP_SATURATED: something was cut to what the
+ * device can hold. */
+hap_status hapi_haptic_grab(hapi_haptic *haptic, hap_pointer_id id, const hapi_grab_setup *setup,
+                            hap_detail *detail);
 
 /* [any] touches.h: what was written, and HAP_STALE when nobody had asked before. */
 hap_status hapi_haptic_touches(hapi_haptic *haptic, hap_pointer_id id, hap_touch *touches,

@@ -16,6 +16,7 @@
 #include "base/thread.h"
 #include "device/device.h"
 #include "device/watchdog.h"
+#include "haptic/grab_box.h"
 #include "haptic/haptic.h"
 #include "haptic/outputs_box.h"
 #include "haptic/own_hands.h"
@@ -62,6 +63,7 @@ typedef struct hapi_pointer_slot {
   hap_pointer_state states[3];
   hapi_pointer_settings_box set;
   hapi_outputs_box outputs;
+  hapi_grab_box grab;
 } hapi_pointer_slot;
 
 /* Published for the statistics; each written by the haptic thread alone. */

@@ -10,6 +10,7 @@
 #include "base/vec.h"
 #include "device/emergency.h"
 #include "guard/force_guard.h"
+#include "haptic/grabs.h"
 #include "haptic/own_call.h"
 #include "haptic/own_forces.h"
 #include "haptic/tick_memory.h"
@@ -170,6 +171,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   haptic->time.tick_budget_ns = 0;
   memset(&haptic->time.load, 0, sizeof haptic->time.load);
   memset(&haptic->time.work, 0, sizeof haptic->time.work);
+  hapi_grabs_reset(haptic);
   hap_status status = hapi_pointers_start_devices(haptic, detail);
   if (status < HAP_OK) {
     return status;

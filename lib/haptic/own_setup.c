@@ -22,9 +22,7 @@ static hap_status setup_bound(const hapi_haptic *haptic, const hapi_pointer_slot
   double period = haptic->tick.facts.period;
   hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, &slot->def, period);
   double scale = slot->def.motion_scale * slot->def.force_scale;
-  double mass = slot->info.mass > 0.0 ? slot->info.mass : HAPI_SAFETY_OWN_MASS;
-  double age = (slot->info.measures_velocity != 0 ? 0.5 : 1.5) * period + slot->info.delay;
-  double damping = HAPI_SAFETY_OWN_DAMPING * mass / (age * scale);
+  double damping = hapi_device_damping(&slot->info, period, scale);
   double unknown = slot->has_device ? slot->def.stiffness : HUGE_VAL;
   double stiffness = gains.known ? gains.stiffness / scale : unknown;
   hap_status status = HAP_OK;

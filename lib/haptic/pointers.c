@@ -13,6 +13,7 @@
 #include "guard/force_guard.h"
 #include "haptic/axes.h"
 #include "haptic/coupling_gains.h"
+#include "haptic/grabs.h"
 #include "haptic/outputs.h"
 #include "haptic/own_forces.h"
 #include "pointer/coupling.h"
@@ -74,6 +75,8 @@ static void slot_prepare(hapi_pointer_slot *slot)
   hapi_triple_init(&slot->target_buffer);
   hapi_triple_init(&slot->state_buffer);
   hapi_own_list_begin(&slot->own);
+  memset(&slot->grab, 0, sizeof slot->grab);
+  hapi_triple_init(&slot->grab.buffer);
   memset(slot->targets, 0, sizeof slot->targets);
   memset(slot->states, 0, sizeof slot->states);
   for (int i = 0; i < 3; ++i) {
@@ -235,6 +238,9 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
         hapi_tape_plays(haptic->tape)) {
       hapi_outputs_take(haptic, i);
     }
+    if (hapi_triple_is_fresh(&slot->grab.buffer) || hapi_tape_plays(haptic->tape)) {
+      hapi_grab_follow(haptic, i);
+    }
     hapi_pointer_input in = {.pose = p->device.pose};
     if (!hapi_tape_plays(haptic->tape)) {
       ask_device(haptic, i, now_ns, &in);
@@ -340,6 +346,7 @@ static void state_tell(const hapi_pointer *p, int64_t now_ns, hap_pointer_state 
   out->coupling_stiffness = p->proxied ? scale * p->coupling.stiffness : 0.0;
   out->coupling_damping = p->proxied ? scale * p->coupling.damping : 0.0;
   out->contact_stiffness = scale * p->coupling.contact_stiffness;
+  out->held = hapi_grab_acts(&p->grab) ? p->grab.tag : NULL;
   out->own = p->declared.any ? declared_felt(p) : (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
 }
 

@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/assert.h"
+#include "local/grab_rows.h"
 
 #define ROWS_PER_CONTACT 3u
 #define ROWS_PER_POINTER_CONTACT 4u /* with friction of a soft finger */
@@ -24,8 +25,8 @@ bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
     tick->contacts.bucket_count *= 2;
   }
   rows->capacity = ROWS_PER_CONTACT * c->contacts +
-                   ROWS_PER_POINTER_CONTACT * (c->contacts + 2 * c->tool_points) + 2 * c->pointers +
-                   HAPI_JOINT_ROWS * c->joints + c->bodies;
+                   ROWS_PER_POINTER_CONTACT * (c->contacts + 2 * c->tool_points) +
+                   (2 + HAPI_GRAB_ROWS) * c->pointers + HAPI_JOINT_ROWS * c->joints + c->bodies;
   rows->solver.tolerance = SOLVER_TOLERANCE;
   rows->solver.update_budget = SOLVER_UPDATES;
   rows->solver.direct_rows = DIRECT_ROWS;

@@ -8,6 +8,7 @@
 #include "local/ball_nearest.h"
 #include "local/body_step.h"
 #include "local/contact_ramp.h"
+#include "local/held_touch.h"
 #include "local/pointer_spring.h"
 #include "local/seams.h"
 #include "local/touch_follow.h"
@@ -498,6 +499,11 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
     }
     c->row = HAPI_NO_ROW;
     touches->close += c->tool == 0 && c->ramp.depth > -CLOSE;
+    if (pointers->grabs) {
+      double touches_by = hapi_held_touches_by(at.pointer, c);
+      at.share *= touches_by;
+      c->hidden = c->hidden || touches_by <= 0.0;
+    }
     if (!placed || c->hidden) {
       hapi_v3_set(c->force, 0.0, 0.0, 0.0);
       continue;

@@ -583,7 +583,7 @@ static uint32_t hits_join(hapi_nearby *nearby, uint32_t count)
   return kept;
 }
 
-static void take_bound_body(hapi_nearby *nearby, uint64_t birth)
+static void take_kept_body(hapi_nearby *nearby, uint64_t birth)
 {
   uint32_t known = hapi_bodies_find_birth(&nearby->world->bodies, birth);
   uint32_t slot = known != HAPI_NONE && known < nearby->visit_capacity
@@ -596,14 +596,17 @@ static void take_bound_body(hapi_nearby *nearby, uint64_t birth)
   }
 }
 
-/* Bodies to which own forces are bound are in the model before all that is near. */
-static void take_bound(hapi_nearby *nearby)
+/* What pointers hold, and what own forces are bound to, is in the model before all that is near. */
+static void take_kept(hapi_nearby *nearby)
 {
   const hapi_state *state = nearby->cycle->state;
   for (uint32_t i = 0; state != NULL && i < state->pointer_count; ++i) {
     const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[i];
     for (uint32_t k = 0; pointer->generation != 0 && k < pointer->bound_count; ++k) {
-      take_bound_body(nearby, pointer->bound[k]);
+      take_kept_body(nearby, pointer->bound[k]);
+    }
+    if (pointer->generation != 0 && pointer->held != 0) {
+      take_kept_body(nearby, pointer->held);
     }
   }
 }
@@ -619,7 +622,7 @@ void hapi_neighbors_find(hapi_nearby *nearby)
   if (!hapi_nearby_reserve_visits(nearby)) {
     hood->candidate_count = 0; /* what cannot be noted is not near */
   }
-  take_bound(nearby);
+  take_kept(nearby);
   for (uint32_t i = 0; i < hood->candidate_count; ++i) {
     hapi_hit *hit = &hood->hits[count];
     const hapi_candidate *near = &hood->candidates[i];

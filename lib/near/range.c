@@ -838,6 +838,21 @@ static void range_expand_further(hapi_nearby *nearby)
   }
 }
 
+/* m/s, of the surface of a body that turns with a hand. */
+static double fastest_of_held(const hapi_nearby *nearby, uint32_t known)
+{
+  const hapi_state_pointer *pointers = hapi_state_pointers(nearby->cycle->state);
+  double fastest = 0.0;
+  for (uint32_t i = 0; i < nearby->cycle->state->pointer_count; ++i) {
+    const hap_twist *twist = &pointers[i].twist;
+    if (pointers[i].generation != 0 && pointers[i].held == known_body(nearby, known)->rest->birth) {
+      fastest = fmax(fastest, hapi_v3_norm(twist->linear) +
+                                  known_body(nearby, known)->extent * hapi_v3_norm(twist->angular));
+    }
+  }
+  return fastest;
+}
+
 void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
 {
   hapi_range *range = &nearby->range;
@@ -864,8 +879,9 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
   }
   hapi_cover_begin(&range->links.cover);
   for (uint32_t i = 0; i < nearby->slots.body_high; ++i) {
-    if (nearby->slots.bodies[i].held) {
-      range_enqueue(nearby, nearby->slots.bodies[i].known);
+    uint32_t known = nearby->slots.bodies[i].known;
+    if (nearby->slots.bodies[i].held && range_enqueue(nearby, known)) {
+      range->fastest = fmax(range->fastest, fastest_of_held(nearby, known));
     }
   }
   for (uint32_t i = 0; i < hit_count; ++i) { /* nearest first */

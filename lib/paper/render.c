@@ -8,6 +8,7 @@
 #include "base/vec.h"
 #include "local/contact_ramp.h"
 #include "local/explained.h"
+#include "local/held_touch.h"
 #include "local/pointer_friction.h"
 #include "local/tool_place.h"
 #include "local/touch_follow.h"
@@ -196,6 +197,7 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
     at.push = c->feel.push;
   }
   c->hidden = c->is_hidden;
+  share *= hapi_held_touches_by(p, c);
   double force = c->hidden ? 0.0 : normal_force(facts, c, p, &at, share, depth);
   if (force == 0.0 || facts->faulted) {
     return;

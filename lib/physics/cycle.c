@@ -232,7 +232,7 @@ void hapi_physics_test(hapi_physics *physics)
 /* It simulates in the hand's time alone, with the step as created, and knows of contacts alone. */
 static bool may_look_back(const hapi_cycle *cycle)
 {
-  return !hapi_state_binds(cycle->state) && cycle->time_scale == 1.0 && cycle->step_scale == 1.0 &&
+  return !hapi_state_holds(cycle->state) && cycle->time_scale == 1.0 && cycle->step_scale == 1.0 &&
          cycle->steady;
 }
 

@@ -47,6 +47,15 @@ static void fill_brace(const hapi_slot_account *of, hapi_model_body *out)
   }
 }
 
+static void fill_mass(dBodyID body, hapi_model_body *out)
+{
+  dMass mass;
+  dBodyGetMass(body, &mass);
+  out->mass = mass.mass;
+  hapi_matrix_read(mass.I, out->inertia);
+  hapi_m3_invert(out->inertia, out->inverse_inertia);
+}
+
 /* What the loop needs to move the body itself. */
 static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
                           const hapi_body_answer *answer, hapi_slot_account *of,
@@ -54,11 +63,7 @@ static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
 {
   const hapi_known_body *known = &p->world->bodies.entries[slot->known];
   dBodyID body = known->body;
-  dMass mass;
-  dBodyGetMass(body, &mass);
-  out->mass = mass.mass;
-  hapi_matrix_read(mass.I, out->inertia);
-  hapi_m3_invert(out->inertia, out->inverse_inertia);
+  fill_mass(body, out);
   /* Whether the loop is to let its inertia turn. One that does not spin yet may do so before the
    * next sync: that is the tick's to see. */
   hap_effect_wish wish = hapi_wish(p->cycle->wishes, HAP_EFFECT_GYRO);
@@ -199,6 +204,9 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, ha
     if ((slot->flags & HAPI_BODY_OWNED) != 0 && dBodyGetNumJoints(body) == 0) {
       hapi_v3_copy(of->falls, out->b); /* over the age of the model, when it comes in */
     }
+  }
+  if (p->cycle->model == HAP_MODEL_SINGLE && slot->held) {
+    fill_mass(body, out);
   }
   body_scale(p->cycle->time_scale, out);
   bool sound = hapi_pose_is_sound(body) && hapi_finite(out->twist.linear, 3) &&

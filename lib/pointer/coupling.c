@@ -22,7 +22,8 @@
 /* A sphere has torque of friction alone, and only on a device that turns it. */
 void hapi_pointer_feel(hapi_pointer *p, hap_effect_wish wish, bool rubs)
 {
-  bool called = !p->device.three_dof && (p->shape.hull != NULL || (p->device.turns && rubs));
+  bool turned = p->device.turns && (rubs || hapi_grab_acts(&p->grab));
+  bool called = !p->device.three_dof && (p->shape.hull != NULL || turned);
   p->device.feels_torque = (wish == HAP_EFFECT_ON || (wish == HAP_EFFECT_AUTO && called));
 }
 

@@ -14,6 +14,7 @@
 #include <hapode/spatial.h>
 
 #include "pointer/declared.h"
+#include "pointer/grab.h"
 #include "pointer/swings.h"
 #include "pointer/transient.h"
 #include "pointer/velocity.h"
@@ -212,6 +213,7 @@ typedef struct hapi_explained {
   double damping;   /* N s/m */
   double speed;     /* m/s, of the fastest surface */
   double world;     /* N, by motion of the surfaces, and by contacts that come in slowly */
+  double torque;    /* N m, by turning of what is held */
 } hapi_explained;
 
 /* The bound on changes of a force: what is known of the last tick. Device frame and units. */
@@ -278,6 +280,7 @@ typedef struct hapi_pointer {
   hapi_pointer_belief belief;
   hapi_pointer_frame frame;
   hapi_pointer_glides glides;
+  hapi_grab grab;
 } hapi_pointer;
 
 /* N/m, of the pointer or of what it may touch. */
@@ -292,6 +295,7 @@ typedef struct hapi_pointers {
   uint32_t high;         /* from here on no pointer has come yet; before it some may have left */
   bool proxies;          /* some pointer is or may become one */
   bool pushes;           /* in this tick some own force is bound to a body */
+  bool grabs;            /* some pointer holds something, or may */
 } hapi_pointers;
 
 #endif

@@ -47,7 +47,7 @@ static const char *take_haptic(hapi_grammar *g, const hapi_cell *cell)
   if (cell->kind == HAPI_CELL_JOIN && cell->index >= g->pointers) {
     g->pointers = cell->index + 1u;
   }
-  bool of_tick = (cell->kind >= HAPI_CELL_LEAVE && cell->kind <= HAPI_CELL_CALL) ||
+  bool of_tick = (cell->kind >= HAPI_CELL_LEAVE && cell->kind <= HAPI_CELL_GRAB) ||
                  (cell->kind >= HAPI_CELL_OUTPUTS && cell->kind <= HAPI_CELL_AXES);
   return !of_tick            ? "a cell that belongs in no tick"
          : cell->index >= 16 ? "a pointer beyond the 16 that there can be"

@@ -23,6 +23,7 @@ typedef struct hapi_state_pointer {
   double extent;        /* m, of a hull as in hapi_near_tool, else the radius */
   uint32_t bound_count; /* bodies to which own forces are bound; the births of them: */
   uint64_t bound[HAP_FORCES_MAX];
+  uint64_t held; /* birth of the body that it holds or is to hold; 0: none */
 } hapi_state_pointer;
 
 typedef struct hapi_state_body {
@@ -138,13 +139,13 @@ HAPI_MESSAGE_ARRAY(hapi_state_springs, hapi_state, hapi_state_spring, springs_of
 HAPI_MESSAGE_ARRAY(hapi_state_joints, hapi_state, hapi_state_joint, joints_offset)
 HAPI_MESSAGE_ARRAY(hapi_state_sides, hapi_state, hapi_tool_side, sides_offset)
 
-/* Whether some own force is bound to a body. NULL: none is. */
-static inline bool hapi_state_binds(hapi_state *state)
+/* Whether a pointer holds a body, or some own force is bound to one. NULL: none. */
+static inline bool hapi_state_holds(hapi_state *state)
 {
   bool any = false;
   for (uint32_t i = 0; state != NULL && i < state->pointer_count; ++i) {
     const hapi_state_pointer *pointer = &hapi_state_pointers(state)[i];
-    any = any || (pointer->generation != 0 && pointer->bound_count > 0);
+    any = any || (pointer->generation != 0 && (pointer->held != 0 || pointer->bound_count > 0));
   }
   return any;
 }

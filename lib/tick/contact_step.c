@@ -9,6 +9,8 @@
 #include "local/body_step.h"
 #include "local/brace_rows.h"
 #include "local/contact_rows.h"
+#include "local/grab_place.h"
+#include "local/grab_rows.h"
 #include "local/gyro.h"
 #include "local/pointer_forces.h"
 #include "local/pointer_rows.h"
@@ -447,7 +449,13 @@ static void rows_make(hapi_tick *tick)
   if (tick->touches.tool.count > 0) {
     hapi_tool_place(&tick->touches, &tick->pointers, &tick->bodies, &tick->facts);
   }
+  if (tick->pointers.grabs) {
+    hapi_grabs_place(&tick->pointers, &tick->bodies, &tick->touches, &tick->facts);
+  }
   hapi_pointer_rows(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, rows, sample);
+  if (tick->pointers.grabs) {
+    hapi_grab_rows(&tick->pointers, &tick->bodies, rows, tick->facts.period);
+  }
   uint32_t of_pointers = rows->solver.row_count;
   /* What moves wakes what it touches and what hangs on it, as in ODE; before any of their rows. */
   if (tick->bodies.resting > 0) {
@@ -503,6 +511,9 @@ void hapi_contact_step(hapi_tick *tick)
   tick->rows.work.all += tick->rows.work.done;
   hapi_pointer_forces(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->rows,
                       &tick->sample);
+  if (pointers->grabs) {
+    hapi_grab_forces(pointers, &tick->bodies, &tick->touches, &tick->rows, period);
+  }
   if (pointers->proxies) {
     uint64_t begin = hapi_effect_begin(&tick->sample);
     for (uint32_t i = 0; i < pointers->high; ++i) {

@@ -155,6 +155,7 @@ static void report_pointers(const hapi_tick *tick, hapi_state *out)
     pointers[i].bound_count =
         in->own ? hapi_own_forces_bound(&tick->own[(size_t)i * HAP_FORCES_MAX], pointers[i].bound)
                 : 0;
+    pointers[i].held = in->grab.any ? hapi_grab_holds_for(&in->grab) : 0;
     if (in->shape.hull != NULL) {
       hapi_state_hulls(out)[i] = *in->shape.hull;
     }

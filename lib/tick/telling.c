@@ -357,6 +357,40 @@ static void fault_follow(hapi_telling *telling, const hapi_tick *tick, hapi_even
   }
 }
 
+static void grab_say(const listening *at, hap_event_kind kind, uint32_t number)
+{
+  if (at->ring == NULL) {
+    return;
+  }
+  hap_event event = {.kind = (uint32_t)kind,
+                     .number = number,
+                     .time_ns = at->tick->facts.now_ns,
+                     .pointer.v = hapi_pointer_id_of(at->list->generation, at->index + 1),
+                     .body = at->list->held};
+  hapi_v3_copy(at->pointer->pose.position, event.point);
+  event_put(at->ring, &event);
+}
+
+/* Before the list is of another pointer. */
+static void grab_follow(const listening *at)
+{
+  const hapi_grab *grab = &at->pointer->grab;
+  hapi_felt_list *list = at->list;
+  bool here = at->pointer->generation != 0;
+  uint32_t holding = here && hapi_grab_acts(grab) ? grab->holds : 0;
+  if (holding == list->holding) {
+    return;
+  }
+  if (list->holding != 0) {
+    grab_say(at, HAP_EVENT_LET_GO, here ? grab->ended : (uint32_t)HAP_GRAB_GONE);
+  }
+  list->holding = holding;
+  list->held = grab->tag;
+  if (holding != 0) {
+    grab_say(at, HAP_EVENT_HOLD, 0);
+  }
+}
+
 /* The pointer has left: what it touched is let go. */
 static void list_leave(const listening *at)
 {
@@ -401,6 +435,9 @@ void hapi_telling_follow(hapi_telling *telling, const hapi_tick *tick, bool even
   hapi_event_ring *ring = events ? &telling->events : NULL;
   for (uint32_t i = 0; i < tick->pointers.high; ++i) {
     listening at = {tick, &tick->pointers.of[i], &telling->lists[i], ring, i};
+    if (at.pointer->generation == 0) {
+      grab_follow(&at);
+    }
     if (at.list->generation != at.pointer->generation) {
       list_leave(&at);
       at.list->generation = at.pointer->generation;
@@ -419,6 +456,7 @@ void hapi_telling_follow(hapi_telling *telling, const hapi_tick *tick, bool even
         grippers_follow(&at);
       }
       forces_follow(&at);
+      grab_follow(&at);
     }
   }
   fault_follow(telling, tick, ring);

@@ -10,6 +10,8 @@
 #include "guard/force_guard.h"
 #include "guard/lateness.h"
 #include "guard/oscillation.h"
+#include "local/grab_place.h"
+#include "local/grab_rows.h"
 #include "paper/local_dynamics.h"
 #include "paper/render.h"
 #include "pointer/coupling.h"
@@ -77,7 +79,7 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->facts =
       (hapi_tick_facts){.period = tick->facts.period, .observes = true, .time_scale = 1.0};
   tick->pointers.high = tick->capacity.pointers;
-  tick->pointers.proxies = tick->pointers.pushes = false;
+  tick->pointers.proxies = tick->pointers.pushes = tick->pointers.grabs = false;
   tick->bodies = (hapi_bodies){
       .of = tick->bodies.of, .courses = tick->bodies.courses, .live = tick->bodies.live};
   touches->count = touches->pushing = 0;
@@ -141,7 +143,13 @@ static __attribute__((noinline)) void paper_step(hapi_tick *tick)
     }
   }
   hapi_local_place(&tick->bodies, &tick->facts);
+  if (tick->pointers.grabs) {
+    hapi_grabs_place(&tick->pointers, &tick->bodies, &tick->touches, &tick->facts);
+  }
   hapi_render(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->sample);
+  if (tick->pointers.grabs) {
+    hapi_grab_push(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches);
+  }
   hapi_local_step(&tick->bodies, &tick->touches, &tick->facts, &tick->sample);
   if (tick->pointers.pushes) {
     const hapi_own_pushing at = hapi_tick_pushing(tick);
