@@ -1,0 +1,909 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Bodies that a hand holds, by the public headers: against closed forms, a plain loop of ODE, and
+ * the world stepped at the haptic rate. */
+
+#include "tests/tap.h"
+
+#include <math.h>
+
+#include <hapode/grab.h>
+#include <hapode/record.h>
+#include <hapode/research.h>
+
+#include "tests/desk.h"
+#include "tests/files.h"
+
+#define G 9.81
+#define EVENTS 64
+
+static hap_grab_def grab_of(void)
+{
+  hap_grab_def def;
+  hap_grab_def_init(&def, sizeof def);
+  return def;
+}
+
+static hap_pointer_state state_of(desk *d)
+{
+  hap_pointer_state state;
+  REQUIRE(hap_pointer_get(d->session, d->hand, &state, sizeof state) == HAP_OK);
+  return state;
+}
+
+static hap_pose pose_of(desk *d, dBodyID body)
+{
+  hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  REQUIRE(hap_session_poses_now(d->session, &body, 1, &pose) >= HAP_OK);
+  return pose;
+}
+
+static size_t events_of(desk *d, hap_event *out)
+{
+  size_t count = 0;
+  (void)hap_session_events(d->session, out, EVENTS, sizeof *out, &count);
+  return count;
+}
+
+static const hap_event *event_of(const hap_event *events, size_t count, hap_event_kind kind)
+{
+  for (size_t i = 0; i < count; ++i) {
+    if (events[i].kind == (uint32_t)kind) {
+      return &events[i];
+    }
+  }
+  return NULL;
+}
+
+static void detail_has(desk *d, const char *words)
+{
+  hap_detail detail;
+  REQUIRE(hap_session_detail(d->session, &detail) == HAP_OK);
+  if (strstr(detail.text, words) == NULL) {
+    printf("# %s\n", detail.text);
+  }
+  CHECK(strstr(detail.text, words) != NULL);
+}
+
+typedef struct how_row {
+  const char *name;
+  hap_model model;
+  double physics_hz;
+} how_row;
+
+static desk *how_desk(const how_row *how, double gravity)
+{
+  desk *d = desk_new(gravity, how->model);
+  d->def.physics_hz = how->physics_hz;
+  return d;
+}
+
+/* A box of 0.1 m in the air, in the middle of which the hand takes hold. */
+static dBodyID box_add(desk *d, double mass)
+{
+  return ode_box(d->world, d->space, mass, AT(0.1, 0.1, 0.1), AT(0.0, 0.0, 0.5));
+}
+
+static void desk_hold(desk *d, dBodyID body, const hap_grab_def *def)
+{
+  hap_status status = hap_pointer_attach(d->session, d->hand, body, def);
+  hap_detail detail = {""};
+  (void)hap_session_detail(d->session, &detail);
+  REQUIRE_SAY(status == HAP_OK, "%s", detail.text);
+}
+
+/* ---- closed forms ---- */
+
+#define HOW(what)                                                   \
+  {what "_in_model_single", HAP_MODEL_SINGLE, 1000.0},              \
+      {what "_in_model_contact_at_60_hz", HAP_MODEL_CONTACT, 60.0}, \
+  {                                                                 \
+    what "_in_model_contact_at_20_hz", HAP_MODEL_CONTACT, 20.0      \
+  }
+
+static const how_row weights[] = {HOW("the_hand_feels_the_weight_of_a_body")};
+
+TEST_EACH(weights, const how_row *row)
+{
+  const double masses[] = {0.05, 0.5, 5.0};
+  for (int i = 0; i < 3; ++i) {
+    desk *d = how_desk(row, G);
+    dBodyID body = box_add(d, masses[i]);
+    hap_grab_def def = grab_of();
+    def.damping = 2.0 * sqrt(STIFFNESS * masses[i]);
+    desk_run(d, 0.0, 0.0, 0.5);
+    desk_hold(d, body, &def);
+    desk_wait(d, 1500);
+    hap_pointer_state state = state_of(d);
+    check_vector(state.wrench.force, 0.0, 0.0, -masses[i] * G, 1e-3 * masses[i] * G);
+    CHECK(state.held == body);
+    CHECK(state.contacts == 1);
+  }
+}
+
+static const how_row inertias[] = {HOW("the_hand_feels_the_inertia_of_a_body")};
+
+/* A hand that goes to and fro: m x'' = k (h - x) + d (h' - x'). */
+TEST_EACH(inertias, const how_row *row)
+{
+  const double mass = 0.5;
+  const double w = 2.0 * M_PI * 2.0;
+  const double damping = 5.0;
+  const double far = 0.03;
+  desk *d = how_desk(row, 0.0);
+  dBodyID body = box_add(d, mass);
+  hap_grab_def def = grab_of();
+  def.damping = damping;
+  desk_run(d, 0.0, 0.0, 0.5);
+  desk_hold(d, body, &def);
+  double sine = 0.0;
+  double cosine = 0.0;
+  for (int k = 1; k <= 5000; ++k) {
+    d->at[0] = far * sin(w * k * T);
+    d->velocity[0] = far * w * cos(w * k * T);
+    hand_lead(d);
+    REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
+    if (k > 3000) { /* four whole swings */
+      double force = -state_of(d).wrench.force[0];
+      sine += force * sin(w * k * T) / 1000.0;
+      cosine += force * cos(w * k * T) / 1000.0;
+    }
+  }
+  /* F / h = -m w^2 (k + i w d) / (k - m w^2 + i w d) */
+  double re = STIFFNESS - mass * w * w;
+  double im = w * damping;
+  double size = mass * w * w / (re * re + im * im);
+  double want_sine = -size * (STIFFNESS * re + im * im) * far;
+  double want_cosine = -size * (im * re - STIFFNESS * im) * far;
+  double force = hypot(want_sine, want_cosine);
+  CHECK_NEAR(sine, want_sine, 3e-3 * force);
+  CHECK_NEAR(cosine, want_cosine, 1e-2 * force);
+}
+
+static const how_row swings[] = {HOW("a_rod_swings_from_the_hand_as_a_pendulum")};
+
+TEST_EACH(swings, const how_row *row)
+{
+  const double mass = 0.2;
+  const double edge = 0.02;
+  const double length = 0.3;
+  const double arm = 0.14;
+  desk *d = how_desk(row, G);
+  dBodyID rod = ode_box(d->world, d->space, mass, AT(edge, edge, length), AT(0.0, 0.0, 0.5 - arm));
+  hap_grab_def def = grab_of();
+  def.turns = HAP_GRAB_BALL;
+  def.stiffness = 20000.0;
+  def.damping = 20.0;
+  desk_run(d, 0.0, 0.0, 0.5);
+  desk_hold(d, rod, &def);
+  desk_move(d, 0.005, 0.0, 0.0, 100);
+  desk_wait(d, 300);
+  double first = 0.0;
+  double last = 0.0;
+  int turns = 0;
+  double before = 0.0;
+  for (int k = 0; k < 9000; ++k) {
+    desk_wait(d, 1);
+    double across = pose_of(d, rod).position[0] - d->at[0];
+    if (k > 0 && before < 0.0 && across >= 0.0) {
+      double at = k - across / (across - before);
+      first = turns == 0 ? at : first;
+      last = at;
+      ++turns;
+    }
+    before = across;
+  }
+  double inertia = mass * (length * length + edge * edge) / 12.0 + mass * arm * arm;
+  double period = 2.0 * M_PI * sqrt(inertia / (mass * G * arm));
+  REQUIRE(turns >= 8);
+  CHECK_NEAR(T * (last - first) / (turns - 1), period, 2e-3 * period);
+}
+
+static const how_row torques[] = {HOW("a_body_held_beside_its_centre_turns_the_hand")};
+
+TEST_EACH(torques, const how_row *row)
+{
+  const double mass = 0.3;
+  const double arm = 0.04;
+  desk *d = how_desk(row, G);
+  dBodyID body = box_add(d, mass);
+  hap_grab_def def = grab_of();
+  def.stiffness = 4000.0;
+  def.damping = 30.0;
+  def.turn_damping = 0.1;
+  d->hand_def.max_torque = 100.0;
+  desk_run(d, arm, 0.0, 0.5);
+  desk_hold(d, body, &def);
+  desk_wait(d, 2000);
+  hap_pointer_state state = state_of(d);
+  double lever = d->at[0] - pose_of(d, body).position[0]; /* it hangs a little aslant */
+  check_vector(state.wrench.force, 0.0, 0.0, -mass * G, 1e-3 * mass * G);
+  CHECK_NEAR(state.wrench.torque[1], -mass * G * lever, 5e-3 * mass * G * arm);
+  CHECK(fabs(lever - arm) < 0.1 * arm);
+}
+
+/* ---- carried into a stack ---- */
+
+#define EDGE 0.06
+#define LAYER 1e-6 /* m: contacts rest anywhere within it, which is felt by the spring */
+#define TOP (CUBES * (EDGE - LAYER) + 0.5 * EDGE)
+#define CUBES 3
+#define WAY_TICKS 2000
+#define MU 0.5
+
+/* A stack of cubes on a floor; the last cube is held above it. */
+static dBodyID stack_add(dWorldID world, dSpaceID space)
+{
+  dCreatePlane(space, 0.0, 0.0, 1.0, 0.0);
+  dWorldSetContactSurfaceLayer(world, LAYER);
+  dWorldSetQuickStepNumIterations(world, 200);
+  for (int i = 0; i < CUBES; ++i) {
+    (void)ode_box(world, space, 0.3, AT(EDGE, EDGE, EDGE),
+                  AT(0.0, 0.0, i * (EDGE - LAYER) + 0.5 * EDGE - LAYER));
+  }
+  return ode_box(world, space, 0.2, AT(EDGE, EDGE, EDGE), AT(0.0, 0.0, TOP + 0.02));
+}
+
+/* The hand in the middle of the held cube: down, it presses, drags, and lifts. */
+static void stack_hand(int k, double at[3], double velocity[3])
+{
+  static const double stops[][4] = {{0.0, 0.0, 0.0, 0.02},        {300.0, 0.0, 0.0, 0.02},
+                                    {600.0, 0.0, 0.0, -0.006},    {900.0, 0.0, 0.0, -0.006},
+                                    {1400.0, 0.012, 0.0, -0.006}, {1600.0, 0.012, 0.0, -0.006},
+                                    {2000.0, 0.012, 0.0, 0.02}};
+  int i = 0;
+  while (i < 5 && k >= stops[i + 1][0]) {
+    ++i;
+  }
+  double ticks = stops[i + 1][0] - stops[i][0];
+  double share = (k - stops[i][0]) / ticks;
+  for (int c = 0; c < 3; ++c) {
+    double from = stops[i][c + 1];
+    double way = stops[i + 1][c + 1] - from;
+    double rest = c == 2 ? TOP : 0.0;
+    at[c] = rest + from + way * 0.5 * (1.0 - cos(M_PI * share));
+    velocity[c] = way * 0.5 * M_PI * sin(M_PI * share) / (ticks * T);
+  }
+}
+
+static bool stack_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  (void)user;
+  (void)a;
+  (void)b;
+  io->mu = MU;
+  return true;
+}
+
+static void stack_run(const how_row *how, double out[WAY_TICKS][3])
+{
+  desk *d = how_desk(how, G);
+  dBodyID body = stack_add(d->world, d->space);
+  d->ode.surface = stack_surface;
+  hap_grab_def def = grab_of();
+  def.damping = 10.0;
+  def.turn_damping = 0.05 * 0.05 * 10.0;
+  stack_hand(0, d->at, d->velocity);
+  desk_run(d, d->at[0], d->at[1], d->at[2]);
+  desk_hold(d, body, &def);
+  for (int k = 0; k < WAY_TICKS; ++k) {
+    stack_hand(k, d->at, d->velocity);
+    hand_lead(d);
+    REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
+    memcpy(out[k], state_of(d).wrench.force, sizeof out[k]);
+  }
+  tap_release(d);
+}
+
+/* ---- the same without this library ---- */
+
+#define PLAIN_CONTACTS 8
+
+typedef struct plain_loop {
+  dWorldID world;
+  dSpaceID space;
+  dJointGroupID contacts;
+} plain_loop;
+
+static void plain_meet(void *data, dGeomID a, dGeomID b)
+{
+  plain_loop *p = data;
+  dContact found[PLAIN_CONTACTS];
+  memset(found, 0, sizeof found);
+  int count = dCollide(a, b, PLAIN_CONTACTS, &found[0].geom, sizeof found[0]);
+  for (int i = 0; i < count; ++i) {
+    found[i].surface.mode = dContactApprox1;
+    found[i].surface.mu = MU;
+    dJointAttach(dJointCreateContact(p->world, p->contacts, &found[i]), dGeomGetBody(a),
+                 dGeomGetBody(b));
+  }
+}
+
+/* Spring and damper from the middle of the body to the hand, which keeps its turn. */
+static void plain_pull(dBodyID body, double share, const double at[3], const double velocity[3],
+                       double out[3])
+{
+  static const double k[2] = {STIFFNESS, 0.05 * 0.05 * STIFFNESS};
+  static const double d[2] = {10.0, 0.05 * 0.05 * 10.0};
+  const dReal *x = dBodyGetPosition(body);
+  const dReal *v = dBodyGetLinearVel(body);
+  const dReal *q = dBodyGetQuaternion(body);
+  const dReal *w = dBodyGetAngularVel(body);
+  double sign = q[0] < 0.0 ? 2.0 : -2.0;
+  for (int c = 0; c < 3; ++c) {
+    out[c] = -share * (k[0] * (at[c] - x[c]) + d[0] * (velocity[c] - v[c]));
+  }
+  dBodyAddForce(body, -out[0], -out[1], -out[2]);
+  dBodyAddTorque(body, share * (k[1] * sign * q[1] - d[1] * w[0]),
+                 share * (k[1] * sign * q[2] - d[1] * w[1]),
+                 share * (k[1] * sign * q[3] - d[1] * w[2]));
+}
+
+static void stack_plain(double out[WAY_TICKS][3])
+{
+  plain_loop p;
+  ode_world_make(G, &p.world, &p.space);
+  ode_world_stiffen(p.world, 50);
+  p.contacts = dJointGroupCreate(0);
+  dBodyID body = stack_add(p.world, p.space);
+  for (int i = 0; i < WAY_TICKS; ++i) {
+    double at[3];
+    double velocity[3];
+    stack_hand(i, at, velocity);
+    dSpaceCollide(p.space, &p, plain_meet);
+    plain_pull(body, fmin((i + 1) / 20.0, 1.0), at, velocity, out[i]);
+    dWorldQuickStep(p.world, T);
+    dJointGroupEmpty(p.contacts);
+  }
+  dJointGroupDestroy(p.contacts);
+  ode_world_end(NULL, p.world, p.space);
+}
+
+static double stack_error(double a[WAY_TICKS][3], double b[WAY_TICKS][3])
+{
+  double apart = 0.0;
+  double all = 0.0;
+  for (int k = 100; k < WAY_TICKS; ++k) {
+    for (int c = 0; c < 3; ++c) {
+      apart += (a[k][c] - b[k][c]) * (a[k][c] - b[k][c]);
+      all += b[k][c] * b[k][c];
+    }
+  }
+  return sqrt(apart / all);
+}
+
+TEST(a_body_carried_into_a_stack_feels_as_in_model_single_and_in_a_plain_loop)
+{
+  static double reference[WAY_TICKS][3];
+  static double plain[WAY_TICKS][3];
+  static double felt[WAY_TICKS][3];
+  const how_row single = {"", HAP_MODEL_SINGLE, 1000.0};
+  stack_run(&single, reference);
+  stack_plain(plain);
+  for (int i = 0; i < 2; ++i) {
+    const how_row contact = {"", HAP_MODEL_CONTACT, i == 0 ? 60.0 : 20.0};
+    stack_run(&contact, felt);
+    double error = stack_error(felt, reference);
+    double apart = stack_error(felt, plain);
+    printf("# %g Hz: %.3f %% of single, %.3f %% of plain ODE\n", contact.physics_hz, 100.0 * error,
+           100.0 * apart);
+    CHECK(error < 0.01);
+    CHECK(apart < 0.01);
+  }
+}
+
+/* ---- what there is to be told ---- */
+
+TEST(what_is_held_and_why_it_ended_is_told)
+{
+  hap_event events[EVENTS];
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID body = box_add(d, 1.0);
+  desk_run(d, 0.0, 0.0, 0.5);
+  (void)events_of(d, events);
+  CHECK(state_of(d).held == NULL);
+  desk_wait(d, 30);
+  desk_hold(d, body, NULL);
+  desk_wait(d, 30);
+  CHECK(state_of(d).held == body);
+  const hap_event *event = event_of(events, events_of(d, events), HAP_EVENT_HOLD);
+  REQUIRE(event != NULL);
+  CHECK(event->body == body);
+  check_vector(event->point, 0.0, 0.0, 0.5, 1e-12);
+  CHECK(hap_pointer_release(d->session, d->hand) == HAP_OK);
+  desk_wait(d, 30);
+  CHECK(state_of(d).held == NULL);
+  event = event_of(events, events_of(d, events), HAP_EVENT_LET_GO);
+  REQUIRE(event != NULL);
+  CHECK(event->number == HAP_GRAB_RELEASED);
+  CHECK(hap_pointer_release(d->session, d->hand) == HAP_OK);
+  CHECK(strcmp(hap_event_name(HAP_EVENT_HOLD), "hold") == 0);
+  CHECK(strcmp(hap_event_name(HAP_EVENT_LET_GO), "let-go") == 0);
+  detail_has(d, "");
+}
+
+TEST(a_grab_that_cannot_be_says_why)
+{
+  const hap_pointer_id nobody = {0};
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID body = box_add(d, 1.0);
+  dBodyID other = dBodyCreate(d->world); /* with neither geom nor joint */
+  hap_grab_def def = grab_of();
+  hap_grab_def raw;
+  memset(&raw, 0, sizeof raw);
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  hand_lead(d);
+  CHECK(hap_pointer_attach(d->session, d->hand, body, NULL) == HAP_ERROR_STATE);
+  detail_has(d, "hap_session_start");
+  session_run(d->session);
+  CHECK(hap_pointer_attach(NULL, d->hand, body, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_attach(d->session, d->hand, NULL, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_pointer_attach(d->session, d->hand, other, NULL) == HAP_ERROR_NOT_FOUND);
+  detail_has(d, "hap_session_adopt_body");
+  CHECK(hap_pointer_attach(d->session, nobody, body, NULL) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_pointer_attach(d->session, d->hand, body, &raw) == HAP_ERROR_UNINITIALISED);
+  CHECK(hap_pointer_release(d->session, nobody) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_pointer_release(NULL, d->hand) == HAP_ERROR_ARGUMENT);
+  const struct {
+    size_t at;
+    double value;
+    const char *name;
+  } wrong[] = {
+      {offsetof(hap_grab_def, stiffness), -1.0, "stiffness"},
+      {offsetof(hap_grab_def, damping), (double)NAN, "damping"},
+      {offsetof(hap_grab_def, turn_stiffness), 1e7, "turn_stiffness"},
+      {offsetof(hap_grab_def, turn_damping), -1e-9, "turn_damping"},
+      {offsetof(hap_grab_def, max_force), (double)INFINITY, "max_force"},
+      {offsetof(hap_grab_def, max_torque), -1.0, "max_torque"},
+      {offsetof(hap_grab_def, pose_body_pointer), (double)NAN, "pose_body_pointer"},
+  };
+  for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
+    hap_grab_def bad = def;
+    memcpy((char *)&bad + wrong[i].at, &wrong[i].value, sizeof wrong[i].value);
+    CHECK(hap_pointer_attach(d->session, d->hand, body, &bad) == HAP_ERROR_ARGUMENT);
+    detail_has(d, wrong[i].name);
+  }
+  def.turns = 7;
+  CHECK(hap_pointer_attach(d->session, d->hand, body, &def) == HAP_ERROR_ARGUMENT);
+  def = grab_of();
+  def.place = 2;
+  CHECK(hap_pointer_attach(d->session, d->hand, body, &def) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_set_model(d->session, HAP_MODEL_IMPULSE) == HAP_OK);
+  CHECK(hap_pointer_attach(d->session, d->hand, body, NULL) == HAP_ERROR_UNSUPPORTED);
+  detail_has(d, "contact or single");
+  desk_wait(d, 50);
+  CHECK(state_of(d).held == NULL);
+  dBodyDestroy(other);
+}
+
+TEST(another_model_and_a_rigid_coupling_end_it)
+{
+  hap_event events[EVENTS];
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID body = box_add(d, 1.0);
+  desk_run(d, 0.0, 0.0, 0.5);
+  (void)events_of(d, events);
+  desk_hold(d, body, NULL);
+  desk_wait(d, 50);
+  REQUIRE(state_of(d).held == body);
+  CHECK(hap_session_set_model(d->session, HAP_MODEL_ACCELERANCE) == HAP_OK);
+  desk_wait(d, 100);
+  CHECK(state_of(d).held == NULL);
+  const hap_event *event = event_of(events, events_of(d, events), HAP_EVENT_LET_GO);
+  REQUIRE(event != NULL);
+  CHECK(event->number == HAP_GRAB_REFUSED);
+}
+
+TEST(a_body_that_is_destroyed_or_put_elsewhere_is_let_go)
+{
+  for (int way = 0; way < 2; ++way) {
+    hap_event events[EVENTS];
+    const hap_pose there = {{1.0, 0.0, 0.5}, {1.0, 0.0, 0.0, 0.0}};
+    desk *d = desk_new(G, HAP_MODEL_CONTACT);
+    dBodyID body = box_add(d, 1.0);
+    desk_run(d, 0.0, 0.0, 0.5);
+    (void)events_of(d, events);
+    desk_hold(d, body, NULL);
+    desk_wait(d, 500);
+    CHECK(state_of(d).wrench.force[2] < -5.0);
+    if (way == 0) {
+      dGeomDestroy(dBodyGetFirstGeom(body));
+      dBodyDestroy(body);
+    } else {
+      CHECK(hap_session_teleport_body(d->session, body, &there) == HAP_OK);
+    }
+    desk_wait(d, 60);
+    CHECK(state_of(d).held == NULL);
+    check_vector(state_of(d).wrench.force, 0.0, 0.0, 0.0, 1e-9);
+    const hap_event *event = event_of(events, events_of(d, events), HAP_EVENT_LET_GO);
+    REQUIRE(event != NULL);
+    CHECK(event->number == HAP_GRAB_GONE);
+  }
+}
+
+/* ---- how it begins and ends ---- */
+
+static const how_row begins[] = {HOW("nothing_leaps_when_a_body_is_taken_and_let_go")};
+
+TEST_EACH(begins, const how_row *row)
+{
+  const double mass = 1.0;
+  desk *d = how_desk(row, G);
+  dCreatePlane(d->space, 0.0, 0.0, 1.0, 0.45);
+  dBodyID body = box_add(d, mass); /* it stands */
+  desk_run(d, 0.0, 0.0, 0.56);     /* the hand above it */
+  desk_wait(d, 100);
+  desk_move(d, 0.0, 0.0, -0.004, 100); /* presses with 4 N */
+  desk_wait(d, 200);
+  double pressed = state_of(d).wrench.force[2];
+  CHECK_NEAR(pressed, 4.0, 0.1);
+  desk_hold(d, body, NULL);
+  double before = pressed;
+  double step = 0.0;
+  for (int k = 0; k < 100; ++k) {
+    desk_wait(d, 1);
+    double force = state_of(d).wrench.force[2];
+    step = fmax(step, fabs(force - before));
+    before = force;
+  }
+  CHECK(step < 2.5 * 4.0 / 20.0); /* in 20 ms, not at once */
+  CHECK_NEAR(before, 0.0, 0.05);
+  desk_move(d, 0.0, 0.0, 0.2, 1000);
+  desk_wait(d, 1000);
+  CHECK_NEAR(state_of(d).wrench.force[2], -mass * G, 1e-3 * mass * G);
+  double height = pose_of(d, body).position[2];
+  CHECK(hap_pointer_release(d->session, d->hand) == HAP_OK);
+  before = state_of(d).wrench.force[2];
+  step = 0.0;
+  for (int k = 0; k < 25; ++k) {
+    desk_wait(d, 1);
+    double force = state_of(d).wrench.force[2];
+    step = fmax(step, fabs(force - before));
+    before = force;
+  }
+  CHECK(step < 1.5 * mass * G / 20.0);
+  desk_wait(d, 75);
+  check_vector(state_of(d).wrench.force, 0.0, 0.0, 0.0, 1e-9);
+  double fallen = height - pose_of(d, body).position[2];
+  CHECK(fallen > 0.5 * G * 0.08 * 0.08 && fallen < 0.5 * G * 0.1 * 0.1);
+}
+
+TEST(a_body_comes_to_the_pose_that_was_asked_for)
+{
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID body = box_add(d, 0.5);
+  hap_grab_def def = grab_of();
+  def.place = HAP_GRAB_AT_POSE;
+  def.pose_body_pointer = (hap_pose){{0.02, -0.03, 0.0}, {sqrt(0.5), 0.0, 0.0, sqrt(0.5)}};
+  desk_run(d, 0.0, 0.2, 0.5);
+  desk_hold(d, body, &def);
+  double peak = 0.0;
+  for (int k = 0; k < 1500; ++k) {
+    desk_wait(d, 1);
+    peak = fmax(peak, fabs(state_of(d).wrench.force[1]));
+  }
+  /* The hand's turn is none, so the body's is -90 degrees about z. */
+  hap_pose pose = pose_of(d, body);
+  CHECK_NEAR(fabs(pose.quat_wxyz[0]), sqrt(0.5), 1e-3);
+  CHECK_NEAR(-pose.quat_wxyz[3] * (pose.quat_wxyz[0] < 0.0 ? -1.0 : 1.0), sqrt(0.5), 1e-3);
+  check_vector(pose.position, 0.03, 0.2 + 0.02, 0.5, 1e-3);
+  CHECK(peak > 1.0 &&
+        peak < 1.5 * 0.5 * sqrt(STIFFNESS * 0.5)); /* struck at 0.5 m/s: v sqrt(k m) */
+}
+
+TEST(a_body_far_from_the_hand_is_held_from_the_next_step_on)
+{
+  desk *d = desk_new(G, HAP_MODEL_CONTACT);
+  dBodyID body = box_add(d, 0.5);
+  dBodySetGravityMode(body, 0);
+  desk_run(d, 0.0, 1.0, 0.5);
+  desk_wait(d, 100);
+  desk_hold(d, body, NULL);
+  desk_wait(d, 60);
+  CHECK(state_of(d).held == body);
+  desk_move(d, 0.1, 0.0, 0.0, 500);
+  desk_wait(d, 8000);
+  hap_pose pose = pose_of(d, body);
+  CHECK_NEAR(pose.position[0], 0.1, 1e-3); /* it turns with the hand, a metre away */
+  CHECK_NEAR(pose.position[1], 0.0, 1e-3);
+}
+
+/* ---- several, and what does not give way ---- */
+
+TEST(two_hands_share_the_weight_of_a_bar)
+{
+  hap_pointer_id second;
+  hap_pointer_state states[2];
+  hap_grab_def def = grab_of();
+  desk *d = desk_new(G, HAP_MODEL_CONTACT);
+  dBodyID bar = ode_box(d->world, d->space, 1.2, AT(0.4, 0.04, 0.04), AT(0.0, 0.0, 0.5));
+  def.turns = HAP_GRAB_BALL;
+  def.damping = 20.0;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &second) == HAP_OK);
+  const hap_pose there = {{0.1, 0.0, 0.5}, {1.0, 0.0, 0.0, 0.0}};
+  const hap_twist still = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  REQUIRE(hap_pointer_set_target(d->session, second, &there, &still) == HAP_OK);
+  d->at[0] = -0.2;
+  d->at[2] = 0.5;
+  hand_lead(d);
+  session_run(d->session);
+  desk_hold(d, bar, &def);
+  REQUIRE(hap_pointer_attach(d->session, second, bar, &def) == HAP_OK);
+  desk_wait(d, 3000);
+  states[0] = state_of(d);
+  REQUIRE(hap_pointer_get(d->session, second, &states[1], sizeof states[1]) == HAP_OK);
+  /* Levers about the middle: 0.2 and 0.1 m. */
+  CHECK_NEAR(states[0].wrench.force[2], -1.2 * G / 3.0, 0.02 * 1.2 * G);
+  CHECK_NEAR(states[1].wrench.force[2], -1.2 * G * 2.0 / 3.0, 0.02 * 1.2 * G);
+  CHECK_NEAR(states[0].wrench.force[2] + states[1].wrench.force[2], -1.2 * G, 1e-3 * 1.2 * G);
+  CHECK(hap_pointer_release(d->session, second) == HAP_OK);
+  desk_wait(d, 1000);
+  REQUIRE(hap_pointer_get(d->session, second, &states[1], sizeof states[1]) == HAP_OK);
+  check_vector(states[1].wrench.force, 0.0, 0.0, 0.0, 1e-9);
+  CHECK(state_of(d).held == bar); /* and it swings there */
+}
+
+TEST(a_kinematic_body_is_a_handle)
+{
+  const hap_model models[] = {HAP_MODEL_CONTACT, HAP_MODEL_SINGLE};
+  for (int i = 0; i < 2; ++i) {
+    desk *d = desk_new(G, models[i]);
+    dBodyID body = box_add(d, 1.0);
+    dBodySetKinematic(body);
+    desk_run(d, 0.0, 0.0, 0.5);
+    desk_hold(d, body, NULL);
+    desk_wait(d, 30);
+    desk_move(d, 0.003, 0.0, -0.002, 100);
+    desk_wait(d, 50);
+    check_vector(state_of(d).wrench.force, -3.0, 0.0, 2.0, 1e-9);
+  }
+}
+
+/* ---- bounds ---- */
+
+typedef struct bound_row {
+  const char *name;
+  double mass;
+  double stiffness; /* of the pointer */
+} bound_row;
+
+static const bound_row bounds[] = {
+    {"10_g_on_1_kN_per_m_stays_bounded", 0.01, 1e3},
+    {"10_g_on_100_kN_per_m_stays_bounded", 0.01, 1e5},
+    {"1_kg_on_100_kN_per_m_stays_bounded", 1.0, 1e5},
+    {"100_kg_on_1_kN_per_m_stays_bounded", 100.0, 1e3},
+    {"100_kg_on_100_kN_per_m_stays_bounded", 100.0, 1e5},
+};
+
+/* A hand that goes to and fro by 10 cm, with a wall and a floor in the way. */
+TEST_EACH(bounds, const bound_row *row)
+{
+  for (int i = 0; i < 2; ++i) {
+    desk *d = desk_new(G, i == 0 ? HAP_MODEL_CONTACT : HAP_MODEL_SINGLE);
+    dCreatePlane(d->space, 0.0, 0.0, 1.0, 0.44);
+    dCreatePlane(d->space, -1.0, 0.0, 0.0, -0.08);
+    dBodyID body = box_add(d, row->mass);
+    d->hand_def.stiffness = row->stiffness;
+    d->hand_def.max_force = 20.0;
+    d->hand_def.max_torque = 1.0;
+    desk_run(d, 0.02, 0.01, 0.5);
+    desk_hold(d, body, NULL);
+    double fastest = 0.0;
+    double hardest = 0.0;
+    hap_pose last = pose_of(d, body);
+    for (int k = 0; k < 4000; ++k) {
+      double phase = 2.0 * M_PI * 1.5 * k * T;
+      d->at[0] = 0.02 + 0.1 * sin(phase);
+      d->at[2] = 0.5 - 0.05 * sin(2.0 * phase);
+      d->velocity[0] = 0.1 * 2.0 * M_PI * 1.5 * cos(phase);
+      d->velocity[2] = -0.05 * 4.0 * M_PI * 1.5 * cos(2.0 * phase);
+      hand_lead(d);
+      REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
+      hap_pose pose = pose_of(d, body);
+      hap_pointer_state state = state_of(d);
+      double way = 0.0;
+      double force = 0.0;
+      for (int c = 0; c < 3; ++c) {
+        way += (pose.position[c] - last.position[c]) * (pose.position[c] - last.position[c]);
+        force += state.wrench.force[c] * state.wrench.force[c];
+      }
+      fastest = fmax(fastest, sqrt(way) / T);
+      hardest = fmax(hardest, sqrt(force));
+      last = pose;
+    }
+    hap_stats stats = session_stats(d->session);
+    printf("# model %d: %.2f m/s, %.1f N\n", i, fastest, hardest);
+    CHECK(fastest < 8.0); /* 20 N pull 10 g for some ms */
+    CHECK(hardest < 20.0 + 1e-6);
+    CHECK(stats.faults.fault == 0);
+    CHECK(fabs(last.position[0]) < 0.5 && last.position[2] > 0.3 && last.position[2] < 1.0);
+  }
+}
+
+TEST(a_hand_that_leaps_takes_the_body_along_slowly)
+{
+  hap_pointer_settings settings;
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID body = box_add(d, 0.5);
+  desk_run(d, 0.0, 0.0, 0.5);
+  desk_hold(d, body, NULL);
+  desk_wait(d, 50);
+  hap_pointer_settings_init(&settings, sizeof settings);
+  REQUIRE(hap_pointer_settings_get(d->session, d->hand, &settings) == HAP_OK);
+  settings.mask = HAP_SET_BASE | HAP_SET_TELEPORT;
+  settings.pose_world_device.position[0] += 1.0;
+  REQUIRE(hap_pointer_set(d->session, d->hand, &settings) == HAP_OK);
+  double hardest = 0.0;
+  for (int k = 0; k < 4000; ++k) {
+    desk_wait(d, 1);
+    hardest = fmax(hardest, fabs(state_of(d).wrench.force[0]));
+  }
+  printf("# %.2f N\n", hardest);
+  CHECK(hardest < 1.5 * 0.5 * sqrt(STIFFNESS * 0.5)); /* at 0.5 m/s */
+  CHECK_NEAR(pose_of(d, body).position[0], 1.0, 1e-3);
+  CHECK(state_of(d).held == body);
+}
+
+/* ---- on a device ---- */
+
+/* A hand of the simulated device that lifts a body from the floor, carries it against a wall, and
+ * puts it down. */
+static hap_stats lift_on_device(desk *d, double mass, const char *device, double *out_step)
+{
+  hap_detail detail = {""};
+  hap_device *hand = NULL;
+  double before[3] = {0.0, 0.0, 0.0};
+  dCreatePlane(d->space, 0.0, 0.0, 1.0, 0.0);
+  dCreatePlane(d->space, -1.0, 0.0, 0.0, -0.1);
+  dBodyID body = ode_box(d->world, d->space, mass, AT(0.04, 0.04, 0.04), AT(0.0, 0.0, 0.02));
+  REQUIRE_SAY(hap_device_open(device, &hand, &detail) == HAP_OK, "%s", detail.text);
+  d->hand_def.device = hand;
+  d->hand_def.max_force = 8.0;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  session_run(d->session);
+  REQUIRE(hap_session_advance(d->session, 300) >= HAP_OK);
+  *out_step = 0.0;
+  for (int k = 0; k < 3700; ++k) {
+    if (k == 100) {
+      REQUIRE(hap_pointer_attach(d->session, d->hand, body, NULL) >= HAP_OK);
+    } else if (k == 3200) {
+      CHECK(hap_pointer_release(d->session, d->hand) == HAP_OK);
+    }
+    REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
+    hap_pointer_state state = state_of(d);
+    double step = 0.0;
+    for (int c = 0; c < 3; ++c) {
+      double change = state.wrench.force[c] - before[c];
+      step += change * change;
+      before[c] = state.wrench.force[c];
+    }
+    *out_step = fmax(*out_step, sqrt(step));
+    CHECK(state.held == (k >= 100 && k < 3215 ? body : state.held));
+  }
+  check_vector(before, 0.0, 0.0, 0.0, 0.5);
+  hap_stats stats = session_stats(d->session);
+  hap_session_stop(d->session);
+  hap_pointer_remove(d->session, d->hand);
+  hap_device_close(hand);
+  return stats;
+}
+
+typedef struct device_row {
+  const char *name;
+  const char *device;
+} device_row;
+
+#define LIFT                                                                    \
+  "virtual:path=0:0/0/0.08;0.3:0/0/0.05;0.5:0/0/0.05;1:0/0/0.1;1.5:0.09/0/0.1;" \
+  "2:0.09/0/0.08;2.5:0/0/0.1;3:0/0/0.05;4:0/0/0.05,"
+
+static const device_row lifts[] = {
+    {"a_simulated_hand_lifts_a_body", LIFT "dof=3"},
+    {"a_simulated_hand_lifts_and_turns_a_body",
+     LIFT "dof=6,turn=0:0/0/0;1:0/0/0;1.5:0/0.5/0;2:0/0/0.7;2.5:0/0/0"},
+    {"a_tense_hand_on_a_stiff_device_lifts_a_body",
+     LIFT "dof=6,hand=tense,rated_stiffness=3000,device_damping=3,device_mass=0.1"},
+    {"a_relaxed_hand_on_a_late_device_lifts_a_body",
+     LIFT "dof=3,hand=relaxed,rated_stiffness=1500,device_damping=2,quantum=2e-5,delay=0.001"},
+};
+
+TEST_EACH(lifts, const device_row *row)
+{
+  const double masses[] = {0.02, 0.2, 0.6, 20.0};
+  for (int i = 0; i < 4; ++i) {
+    double step = 0.0;
+    desk *d = desk_new(G, HAP_MODEL_CONTACT);
+    hap_stats stats = lift_on_device(d, masses[i], row->device, &step);
+    printf("# %g kg: step %.2f N, energy %llu, swings %llu ticks\n", masses[i], step,
+           (unsigned long long)stats.faults.energy_ticks,
+           (unsigned long long)stats.safety.oscillation_ticks);
+    CHECK(stats.faults.fault == 0);
+    CHECK(step < 4.0 + 1e-6); /* N a tick, the slew limit */
+    CHECK(stats.safety.oscillation_ticks == 0);
+    CHECK(stats.faults.energy_ticks < 30); /* of 3700: at the touch before */
+  }
+}
+
+/* ---- recordings ---- */
+
+static void grabbed_session(desk *d, dBodyID body)
+{
+  hap_grab_def def = grab_of();
+  def.turns = HAP_GRAB_BALL;
+  desk_glide(d, 0.0, 0.0, -0.03);
+  desk_hold(d, body, NULL);
+  desk_glide(d, 0.0, 0.0, 0.03);
+  desk_glide(d, 0.03, 0.0, 0.02);
+  CHECK(hap_pointer_release(d->session, d->hand) == HAP_OK);
+  desk_glide(d, 0.0, 0.0, -0.06);
+  desk_hold(d, body, &def);
+  desk_glide(d, 0.0, 0.02, 0.02);
+}
+
+static dBodyID recorded_world(desk *d)
+{
+  dCreatePlane(d->space, 0.0, 0.0, 1.0, 0.0);
+  (void)ode_box(d->world, d->space, 0.3, AT(0.1, 0.1, 0.02), AT(0.05, 0.0, 0.01));
+  return ode_box(d->world, d->space, 0.2, AT(0.04, 0.04, 0.04), AT(0.0, 0.0, 0.04));
+}
+
+TEST(a_replay_holds_and_lets_go_in_the_same_ticks)
+{
+  hap_detail detail = {""};
+  hap_record_def file;
+  hap_player *player = NULL;
+  REQUIRE(folder_make());
+  hap_record_def_init(&file, sizeof file);
+  file.path = folder_path("grab.rec");
+  desk *d = desk_new(G, HAP_MODEL_CONTACT);
+  dBodyID body = recorded_world(d);
+  d->def.drive = HAP_DRIVE_THREADS;
+  d->def.rt_priority = 0;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_session_record(d->session, &file, &detail) == HAP_OK);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  d->at[2] = 0.07;
+  hand_lead(d);
+  session_run(d->session);
+  grabbed_session(d, body);
+  CHECK(state_of(d).held == body);
+  CHECK(hap_session_stop(d->session) == HAP_OK);
+  hap_pointer_state last = state_of(d);
+  hap_pointer_id hand = d->hand;
+  tap_release(d);
+
+  desk *r = desk_new(G, HAP_MODEL_CONTACT);
+  hap_expert_def expert;
+  hap_research_def research;
+  hap_play_difference difference;
+  body = recorded_world(r);
+  hap_expert_def_init(&expert, sizeof expert);
+  hap_research_def_init(&research, sizeof research);
+  REQUIRE(hap_player_open(file.path, HAP_PLAY_WHOLE, &player, &detail) >= HAP_OK);
+  REQUIRE(hap_player_get_def(player, &r->def, &expert, &research) >= HAP_OK);
+  r->session = session_make(&r->def, &r->ode);
+  REQUIRE(hap_session_play(r->session, player, &detail) >= HAP_OK);
+  session_run(r->session);
+  hap_status status = HAP_OK;
+  while (status == HAP_OK) {
+    status = hap_session_advance(r->session, 100);
+  }
+  CHECK(status == HAP_END);
+  CHECK(hap_pointer_attach(r->session, hand, body, NULL) == HAP_ERROR_STATE);
+  CHECK(hap_pointer_release(r->session, hand) == HAP_ERROR_STATE);
+  hap_pointer_state again;
+  REQUIRE(hap_pointer_get(r->session, hand, &again, sizeof again) == HAP_OK);
+  CHECK(again.held == body);
+  CHECK(memcmp(&again.wrench, &last.wrench, sizeof last.wrench) == 0);
+  CHECK(last.wrench.force[2] < 0.0);
+  CHECK(hap_player_difference(player, &difference, sizeof difference) == HAP_OK);
+  CHECK(difference.what == HAP_DIFFERENCE_NONE);
+  hap_session_destroy(r->session);
+  r->session = NULL;
+  hap_player_close(player);
+}
