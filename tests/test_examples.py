@@ -32,6 +32,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "trigger_volume": "docs/force-calls.md",
     "follow_a_path": "docs/force-calls.md",
     "drawer_with_detents": "docs/body-forces.md",
+    "tool_in_hand": "docs/grab.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -251,6 +252,17 @@ def check_two_hands_with_clutch(program):
     stands = all(abs(int(held[3]) - int(free[3])) <= 1 for free, held in zip(rows[::2], rows[1::2]))
     point(len(rows) == 8 and stands, "with the clutch held the box stands", out)
     point(len(rows) == 8 and int(rows[-1][3]) > 165, "the box goes farther than the devices", out)
+def check_tool_in_hand(program):
+    rows = rows_of(run(program),
+                   r"^hand at ([0-9.]+) m (holds the hammer|is empty): +(-?[0-9.]+) N, "
+                   r" *(-?[0-9.]+) N m$")
+    lifted = [row for row in rows if row[0] == "0.150"]
+    point(len(rows) == 18, "it prints every fifth frame", str(rows))
+    point(len(lifted) > 2 and all(-5.9 < float(row[2]) < -4.0 for row in lifted[1:]),
+          "the hand feels the hammer's weight of 4.9 N", str(lifted))
+    point(len(lifted) > 2 and all(float(row[3]) > 0.4 for row in lifted[1:]),
+          "and how its head pulls the stick down", str(lifted))
+    point(rows[-1][1] == "is empty" and float(rows[-1][2]) == 0.0, "it lets go", str(rows[-1:]))
 
 
 def check_record_and_play(program):
