@@ -9,11 +9,8 @@
 #include <math.h>
 
 #include <hapode/grab.h>
-#include <hapode/record.h>
-#include <hapode/research.h>
 
 #include "tests/desk.h"
-#include "tests/files.h"
 
 #define G 9.81
 #define EVENTS 64
@@ -854,21 +851,11 @@ static dBodyID recorded_world(desk *d)
 
 TEST(a_replay_holds_and_lets_go_in_the_same_ticks)
 {
-  hap_detail detail = {""};
-  hap_record_def file;
-  hap_player *player = NULL;
-  REQUIRE(folder_make());
-  hap_record_def_init(&file, sizeof file);
-  file.path = folder_path("grab.rec");
+  hap_play_difference difference;
+  hap_pointer_state again;
   desk *d = desk_new(G, HAP_MODEL_CONTACT);
   dBodyID body = recorded_world(d);
-  d->def.drive = HAP_DRIVE_THREADS;
-  d->def.rt_priority = 0;
-  d->session = session_make(&d->def, &d->ode);
-  REQUIRE(hap_session_record(d->session, &file, &detail) == HAP_OK);
-  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
-  d->at[2] = 0.07;
-  hand_lead(d);
+  desk_record(d, "grab.rec", 0.07);
   session_run(d->session);
   grabbed_session(d, body);
   CHECK(state_of(d).held == body);
@@ -878,32 +865,15 @@ TEST(a_replay_holds_and_lets_go_in_the_same_ticks)
   tap_release(d);
 
   desk *r = desk_new(G, HAP_MODEL_CONTACT);
-  hap_expert_def expert;
-  hap_research_def research;
-  hap_play_difference difference;
   body = recorded_world(r);
-  hap_expert_def_init(&expert, sizeof expert);
-  hap_research_def_init(&research, sizeof research);
-  REQUIRE(hap_player_open(file.path, HAP_PLAY_WHOLE, &player, &detail) >= HAP_OK);
-  REQUIRE(hap_player_get_def(player, &r->def, &expert, &research) >= HAP_OK);
-  r->session = session_make(&r->def, &r->ode);
-  REQUIRE(hap_session_play(r->session, player, &detail) >= HAP_OK);
-  session_run(r->session);
-  hap_status status = HAP_OK;
-  while (status == HAP_OK) {
-    status = hap_session_advance(r->session, 100);
-  }
-  CHECK(status == HAP_END);
+  desk_replay(r, "grab.rec");
+  desk_play(r);
   CHECK(hap_pointer_attach(r->session, hand, body, NULL) == HAP_ERROR_STATE);
   CHECK(hap_pointer_release(r->session, hand) == HAP_ERROR_STATE);
-  hap_pointer_state again;
   REQUIRE(hap_pointer_get(r->session, hand, &again, sizeof again) == HAP_OK);
   CHECK(again.held == body);
   CHECK(memcmp(&again.wrench, &last.wrench, sizeof last.wrench) == 0);
   CHECK(last.wrench.force[2] < 0.0);
-  CHECK(hap_player_difference(player, &difference, sizeof difference) == HAP_OK);
+  CHECK(hap_player_difference(r->player, &difference, sizeof difference) == HAP_OK);
   CHECK(difference.what == HAP_DIFFERENCE_NONE);
-  hap_session_destroy(r->session);
-  r->session = NULL;
-  hap_player_close(player);
 }
