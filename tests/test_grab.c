@@ -493,6 +493,29 @@ TEST(another_model_and_a_rigid_coupling_end_it)
   CHECK(event->number == HAP_GRAB_REFUSED);
 }
 
+TEST(models_contact_and_single_hand_the_body_over)
+{
+  const hap_model models[] = {HAP_MODEL_SINGLE, HAP_MODEL_CONTACT, HAP_MODEL_SINGLE};
+  desk *d = desk_new(G, HAP_MODEL_CONTACT);
+  dBodyID body = box_add(d, 0.5);
+  desk_run(d, 0.0, 0.0, 0.5);
+  desk_hold(d, body, NULL);
+  desk_wait(d, 1000);
+  for (int i = 0; i < 3; ++i) {
+    double least = 0.0;
+    double most = -1000.0;
+    CHECK(hap_session_set_model(d->session, models[i]) == HAP_OK);
+    for (int k = 0; k < 500; ++k) {
+      desk_wait(d, 1);
+      least = fmin(least, state_of(d).wrench.force[2]);
+      most = fmax(most, state_of(d).wrench.force[2]);
+    }
+    printf("# %g .. %g N\n", least, most);
+    CHECK(state_of(d).held == body);
+    CHECK(least > -0.5 * G * 1.15 && most < -0.5 * G * 0.85);
+  }
+}
+
 TEST(a_body_that_is_destroyed_or_put_elsewhere_is_let_go)
 {
   for (int way = 0; way < 2; ++way) {

@@ -69,7 +69,8 @@ HAP_API void hap_grab_def_init(hap_grab_def *def, size_t size_of_def);
  * one body. A kinematic body is a handle that does not give way. def NULL: the defaults.
  *
  * It ends by hap_pointer_release, with the body, with the pointer, with the session's run, and with
- * a fault: HAP_EVENT_LET_GO says why. hap_pointer_get tells what is held.
+ * a fault: HAP_EVENT_LET_GO says why. None begins while a fault is latched, or where the body does
+ * not come within 1 s. hap_pointer_get tells what is held.
  *
  * HAP_SATURATED, and it is held: a stiffness or damping was above what the device can hold and was
  * cut; hap_session_detail has the number. HAP_ERROR_ARGUMENT, and hap_session_detail names the

@@ -1,5 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
+#include <math.h>
+
 #include "base/log.h"
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
@@ -34,7 +36,8 @@ static hap_status setup_bound(const hapi_haptic *haptic, const hapi_pointer_slot
   if (!slot->has_device || !(scale > 0.0)) {
     return HAP_OK;
   }
-  io->damping_most = hapi_device_damping(&slot->info, haptic->tick.facts.period, scale);
+  io->damping_most =
+      fmin(hapi_device_damping(&slot->info, haptic->tick.facts.period, scale), UNBOUND);
   status =
       number_bound("turn_damping", arm * arm * io->damping_most, &io->turn_damping, status, detail);
   status = number_bound("damping", io->damping_most, &io->damping, status, detail);

@@ -25,7 +25,8 @@
 
 #define STIFFER_THAN_PROXY 100.0 /* times the coupling's: 1 % softer in series */
 
-static hapi_local_body *grab_find_body(const hapi_bodies *bodies, uint64_t birth, uint32_t *out)
+static const hapi_local_body *grab_find_body(const hapi_bodies *bodies, uint64_t birth,
+                                             uint32_t *out)
 {
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     if (bodies->of[bodies->live[i]].given.birth == birth) {
@@ -36,13 +37,20 @@ static hapi_local_body *grab_find_body(const hapi_bodies *bodies, uint64_t birth
   return NULL;
 }
 
-/* NULL: it is gone. */
-static const hapi_local_body *grab_body(const hapi_bodies *bodies, const hapi_grab *g)
+/* Whether its body is in the model, perhaps by another number. */
+static bool grab_has_body(const hapi_bodies *bodies, hapi_grab *g)
 {
-  const hapi_local_body *body = &bodies->of[g->hold.body];
-  bool same =
-      body->live && body->generation == g->hold.generation && body->given.birth == g->setup.birth;
-  return same ? body : NULL;
+  hapi_grab_hold *hold = &g->hold;
+  const hapi_local_body *body = &bodies->of[hold->body];
+  if (body->live && body->generation == hold->generation && body->given.birth == g->setup.birth) {
+    return true;
+  }
+  body = grab_find_body(bodies, g->setup.birth, &hold->body);
+  if (body != NULL) {
+    hold->generation = body->generation;
+    hold->epoch = body->epoch + 1; /* as one that was put there */
+  }
+  return body != NULL;
 }
 
 /* Contacts with the body come in again as deep ones do. */
@@ -139,7 +147,7 @@ static bool grab_step(hapi_pointer *p, const hapi_bodies *bodies, const hapi_tou
       grab_end(p, touches, index, HAP_GRAB_GONE);
     }
   }
-  if (hapi_grab_acts(g) && grab_body(bodies, g) == NULL) {
+  if (hapi_grab_acts(g) && !grab_has_body(bodies, g)) {
     grab_end(p, touches, index, HAP_GRAB_GONE);
   }
   if (g->phase == HAPI_GRAB_HOLDS) {
@@ -234,7 +242,7 @@ static void pull_stiffen(hapi_pointer *p, const hapi_local_body *body)
   double arm = HAPI_GRIP_ARM * p->device.motion_scale;
   bool driven = (body->flags & HAPI_BODY_DRIVEN) != 0;
   bool turns = setup->turns == HAP_GRAB_TURNS && p->device.turns && p->device.feels_torque;
-  double mass = driven ? 0.0 : body->given.mass;
+  double mass = driven ? 0.0 : fmax(body->given.mass, body->given.held_mass);
   double inertia =
       driven ? 0.0 : (i[0] + i[4] + i[8]) / 3.0 + mass * hapi_v3_dot(g->hold.place, g->hold.place);
   pull->stiffness = or_else(setup->stiffness, stiffness_rigid(p));

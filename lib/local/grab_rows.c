@@ -261,7 +261,7 @@ static void pull_soften(hapi_grab_pull *pull, const hapi_local_body *body, doubl
   const hapi_model_body *given = &body->given;
   double turns = given->inverse_inertia[0] + given->inverse_inertia[4] + given->inverse_inertia[8];
   double arm[3];
-  double a = given->mass > 0.0 ? 1.0 / given->mass : 0.0;
+  double a = given->held_mass > 0.0 ? 1.0 / given->held_mass : 0.0;
   hapi_pose_unpoint(body->pose.position, body->pose.quat_wxyz, pull->point, arm);
   for (uint32_t k = 0; k < 3; ++k) { /* a trace is above the largest of its eigenvalues */
     double axis[3];

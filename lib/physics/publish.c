@@ -47,13 +47,13 @@ static void fill_brace(const hapi_slot_account *of, hapi_model_body *out)
   }
 }
 
-static void fill_mass(dBodyID body, hapi_model_body *out)
+static double fill_inertia(dBodyID body, hapi_model_body *out)
 {
   dMass mass;
   dBodyGetMass(body, &mass);
-  out->mass = mass.mass;
   hapi_matrix_read(mass.I, out->inertia);
   hapi_m3_invert(out->inertia, out->inverse_inertia);
+  return mass.mass;
 }
 
 /* What the loop needs to move the body itself. */
@@ -63,7 +63,7 @@ static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
 {
   const hapi_known_body *known = &p->world->bodies.entries[slot->known];
   dBodyID body = known->body;
-  fill_mass(body, out);
+  out->mass = fill_inertia(body, out);
   /* Whether the loop is to let its inertia turn. One that does not spin yet may do so before the
    * next sync: that is the tick's to see. */
   hap_effect_wish wish = hapi_wish(p->cycle->wishes, HAP_EFFECT_GYRO);
@@ -121,6 +121,7 @@ static void body_scale(double scale, hapi_model_body *io)
   io->max_angular_speed *= scale;
   if (scale > 0.0) {
     io->mass /= slow2;
+    io->held_mass /= slow2;
     vector_scale(1.0 / slow2, io->inertia, 9);
     vector_scale(slow2, io->inverse_inertia, 9);
   } else {
@@ -205,8 +206,8 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, ha
       hapi_v3_copy(of->falls, out->b); /* over the age of the model, when it comes in */
     }
   }
-  if (p->cycle->model == HAP_MODEL_SINGLE && slot->held) {
-    fill_mass(body, out);
+  if (slot->held) {
+    out->held_mass = fill_inertia(body, out);
   }
   body_scale(p->cycle->time_scale, out);
   bool sound = hapi_pose_is_sound(body) && hapi_finite(out->twist.linear, 3) &&
