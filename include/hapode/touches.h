@@ -87,19 +87,19 @@ typedef enum hap_event_kind {
   /* The first blow of a touch that closed at 0.02 m/s or more: pointer and geom do not come nearer
    * any more, or 20 ms are over */
   HAP_EVENT_IMPACT = 5,
-  HAP_EVENT_BUTTON = 6,    /* pressed or let go */
-  HAP_EVENT_FAULT = 7,     /* the guard has taken the force away */
+  HAP_EVENT_BUTTON = 6, /* pressed or let go */
+  HAP_EVENT_FAULT = 7,  /* the guard has taken the force away */
   /* A gripper has closed or opened: see hap_pointer_outputs.gripper_closed. It begins open. */
   HAP_EVENT_GRIPPER = 8,
   HAP_EVENT_FORCE_OUT = 10, /* the call of an own force was taken out (forces.h) */
-  HAP_EVENT_HOLD = 11,  /* the pointer holds a body (grab.h) */
-  HAP_EVENT_LET_GO = 12 /* it does no more */
+  HAP_EVENT_HOLD = 11,      /* the pointer holds a body (grab.h) */
+  HAP_EVENT_LET_GO = 12     /* it does no more */
 } hap_event_kind;
 
 /* Something that has happened. Its size goes with the call; it may grow at its end. What a kind
  * does not have is 0. */
 typedef struct hap_event {
-  uint32_t kind;          /* hap_event_kind */
+  uint32_t kind; /* hap_event_kind */
   /* BUTTON, GRIPPER (its axis): from 0; FAULT: hap_fault; FORCE_OUT: hap_force_out;
    * LET_GO: hap_grab_end */
   uint32_t number;

@@ -48,7 +48,7 @@ typedef enum hapi_cell_kind {
   HAPI_CELL_SAMPLES = 13, /* behind the OWNs of a vibration that has them: floats */
   HAPI_CELL_CALL = 14, /* what the call of an own force gave: d[0..2] force, d[3..5] torque; word:
                           the force's place; flags: hap_force_out */
-  HAPI_CELL_GRAB = 15,    /* before the POSE: HAPI_GRAB_CELLS of them, a hapi_grab_setup */
+  HAPI_CELL_GRAB = 15, /* before the POSE: HAPI_GRAB_CELLS of them, a hapi_grab_setup */
   HAPI_CELL_OUTPUTS = 25, /* before the POSE: HAPI_OUTPUTS_CELLS of them, a hap_pointer_outputs */
   HAPI_CELL_AXIS = 26,    /* behind the JOINs and HULLs, for each axis of the device: d[0] low, d[1]
                           high, d[2] max_force; word: kind, and from the second byte on the unit */
@@ -225,11 +225,11 @@ static_assert(sizeof(hapi_grab_setup) <= HAPI_GRAB_CELLS * HAPI_CELL_BYTES, "roo
   (((uint32_t)(samples) + HAPI_CELL_SAMPLE_COUNT - 1u) / HAPI_CELL_SAMPLE_COUNT)
 
 /* Of a tick with everything in it; 64 vertices are the most, and one set of samples is taken. */
-#define HAPI_PACKET_MAX                                                              \
-  (1u +                                                                              \
-   16u * (1u + HAPI_JOIN_CELLS + 2u * HAPI_HULL_CELLS(64u) + HAPI_SET_CELLS +        \
-          HAP_FORCES_MAX * (HAPI_OWN_CELLS + 1u) + HAPI_GRAB_CELLS + HAP_AXES_MAX +  \
-          HAPI_AXES_CELLS + HAPI_OUTPUTS_CELLS + 4u) +                               \
+#define HAPI_PACKET_MAX                                                             \
+  (1u +                                                                             \
+   16u * (1u + HAPI_JOIN_CELLS + 2u * HAPI_HULL_CELLS(64u) + HAPI_SET_CELLS +       \
+          HAP_FORCES_MAX * (HAPI_OWN_CELLS + 1u) + HAPI_GRAB_CELLS + HAP_AXES_MAX + \
+          HAPI_AXES_CELLS + HAPI_OUTPUTS_CELLS + 4u) +                              \
    HAPI_SAMPLES_CELLS(HAP_FORCE_SAMPLES_MAX) + HAPI_CELL_BODIES)
 
 #endif

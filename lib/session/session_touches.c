@@ -41,10 +41,12 @@ hap_status hap_session_events(hap_session *session, hap_event *events, size_t ca
 const char *hap_event_name(hap_event_kind kind)
 {
   static const char *const names[] = {
-      [HAP_EVENT_TOUCH] = "touch", [HAP_EVENT_RELEASE] = "release", [HAP_EVENT_SLIDE] = "slide",
-      [HAP_EVENT_STICK] = "stick", [HAP_EVENT_IMPACT] = "impact",   [HAP_EVENT_BUTTON] = "button",
-      [HAP_EVENT_FAULT] = "fault", [HAP_EVENT_GRIPPER] = "gripper", [HAP_EVENT_FORCE_OUT] = "force_out",
-      [HAP_EVENT_HOLD] = "hold", [HAP_EVENT_LET_GO] = "let-go",
+      [HAP_EVENT_TOUCH] = "touch",         [HAP_EVENT_RELEASE] = "release",
+      [HAP_EVENT_SLIDE] = "slide",         [HAP_EVENT_STICK] = "stick",
+      [HAP_EVENT_IMPACT] = "impact",       [HAP_EVENT_BUTTON] = "button",
+      [HAP_EVENT_FAULT] = "fault",         [HAP_EVENT_GRIPPER] = "gripper",
+      [HAP_EVENT_FORCE_OUT] = "force_out", [HAP_EVENT_HOLD] = "hold",
+      [HAP_EVENT_LET_GO] = "let-go",
   };
   size_t at = (size_t)kind;
   return at < sizeof names / sizeof names[0] ? names[at] : NULL;

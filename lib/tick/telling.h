@@ -41,9 +41,9 @@ typedef struct hapi_felt {
 typedef struct hapi_felt_list {
   uint32_t generation; /* of the pointer */
   uint32_t buttons;
-  uint32_t closed; /* grippers, a bit for each axis */
+  uint32_t closed;     /* grippers, a bit for each axis */
   uint32_t forces_out; /* a bit for each own force whose call was taken out, as told */
-  uint32_t holding; /* number of the hold that was told; 0: none is */
+  uint32_t holding;    /* number of the hold that was told; 0: none is */
   hapi_tag held;
   uint32_t count;
   hapi_felt of[HAP_TOUCHES_MAX];
