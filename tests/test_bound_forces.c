@@ -145,7 +145,7 @@ TEST(what_the_hand_gets_the_body_gets_the_other_way)
 #define SWING 80.0 /* N/m */
 
 /* A semi-implicit step turns the phase by w T with sin(w T / 2) = T / 2 sqrt(k / m): then of the
- * way, and so of the force, f(t + T) = 2 cos(w T) f(t) - f(t - T). The largest force of a second. */
+ * way, and so of the force, f(t + T) = 2 cos(w T) f(t) - f(t - T). The largest one of a second. */
 static double swing_listen(desk *d)
 {
   double turn = 2.0 * asin(0.5 * T * sqrt(SWING / MASS));

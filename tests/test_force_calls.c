@@ -366,6 +366,9 @@ static bool out_within(desk *d, hap_force_id id, hap_force_out want)
   hap_force_state state = {.out = HAP_FORCE_IN};
   for (int ms = 0; ms < WAIT_MS && state.out != (uint32_t)want; ++ms) {
     sleep_ms(1);
+    if (want == HAP_FORCE_OUT_LATE) { /* late ticks of a busy machine: no call under a fault */
+      (void)hap_session_reset_fault(d->session);
+    }
     (void)hap_pointer_force_get(d->session, d->hand, id, &state, sizeof state);
   }
   return state.out == (uint32_t)want;
@@ -409,6 +412,7 @@ TEST(late_calls_now_and_then_add_up)
   hap_force_state state = {.out = HAP_FORCE_IN};
   for (int i = 0; i < 40 && state.out == HAP_FORCE_IN; ++i) {
     sleep_ms(150);
+    (void)hap_session_reset_fault(d->session);
     atomic_store(&s.once_ms, 3);
     (void)hap_pointer_force_get(d->session, d->hand, id, &state, sizeof state);
   }

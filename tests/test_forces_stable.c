@@ -2,7 +2,7 @@
  * SPDX-License-Identifier: MIT */
 
 /* A map of own forces that are bound to bodies, over masses, stiffnesses and rates of physics: a
- * hand drags a box over a floor, along a row of others, and rubs on a texture. By the public headers.
+ * hand drags a box over a floor, along a row of others, and rubs on a texture. By public headers.
  * Asked is: no fault, forces within their limits, no body that is thrown, and nearly rest at the
  * end. */
 

@@ -173,7 +173,8 @@ typedef enum hap_guard_flag {
   HAP_GUARD_LATE = 64,         /* less force: ticks of the loop came late */
   HAP_GUARD_OSCILLATION = 128, /* less force: the device swings by itself, or seems to run away */
   HAP_GUARD_INPUT = 256,       /* the device is not believed, or no motion explains the force */
-  HAP_GUARD_OWN = 512 /* an own force was more than it promises and was shortened (forces.h) */
+  /* an own force (forces.h) or one on an axis (outputs.h) was more than it promises: shortened */
+  HAP_GUARD_OWN = 512
 } hap_guard_flag;
 
 /* A pointer in its last tick. It has a size and may grow at its end. */

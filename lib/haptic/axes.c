@@ -2,7 +2,6 @@
  * SPDX-License-Identifier: MIT */
 #include "haptic/axes.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "device/device.h"

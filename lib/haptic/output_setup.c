@@ -9,17 +9,6 @@
 /* What the application wants of a device beside the wrench: checked against what the device has,
  * promises filled in, and into the pointer's box. */
 
-static bool is_none(const void *bytes, size_t size)
-{
-  const char *at = bytes;
-  for (size_t i = 0; i < size; ++i) {
-    if (at[i] != 0) {
-      return false;
-    }
-  }
-  return true;
-}
-
 static hap_status axis_check(const hapi_pointer_slot *slot, uint32_t index, hap_axis_push *io,
                              hap_detail *detail)
 {
@@ -72,7 +61,7 @@ static hap_status outputs_check(const hapi_pointer_slot *slot, hap_pointer_outpu
                        "within [0, 1e5]",
                        i, vibration->amplitude, vibration->frequency);
     }
-    if (i >= slot->info.vibrator_count && !is_none(vibration, sizeof *vibration)) {
+    if (i >= slot->info.vibrator_count && vibration->amplitude > 0.0) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT, "vibrators[%u]: the device has %u of them", i,
                        slot->info.vibrator_count);
     }

@@ -12,10 +12,10 @@
  * into the pointer's list. */
 
 /* What the device can hold: of a spring as of a proxy's. Of a device without figures nobody knows:
- * the stiffness of the pointer is what the application has chosen for it. A pointer without a device
- * has nothing that could swing. Of a damper see pointer/own_force.c: the
- * velocity is old by half a tick, by the device's delay, and by a tick where it is estimated. World
- * units: a newton is force_scale newtons of the device. */
+ * the stiffness of the pointer is what the application has chosen for it. A pointer without a
+ * device has nothing that could swing. Of a damper see pointer/own_force.c: the velocity is old by
+ * half a tick, by the device's delay, and by a tick where it is estimated. World units: a newton is
+ * force_scale newtons of the device. */
 static hap_status setup_bound(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
                               hapi_force_setup *io, hap_detail *detail)
 {

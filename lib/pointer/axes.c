@@ -80,6 +80,7 @@ bool hapi_axes_judge(hapi_axes *axes, const double *at, const double *rates, int
       axis->at = hapi_max(hapi_min(at[i], axis->high), axis->low);
     }
     believed = axis_judge(axis, at[i], rates[i], begins ? 0.0 : seconds) && believed;
+    axis->jumped = axis->jumped || (begins && axes->known); /* nobody saw it go there */
   }
   axes->known = axes->known || believed;
   axes->read_ns = now_ns;

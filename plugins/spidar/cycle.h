@@ -19,6 +19,10 @@
 #define HAPI_SPIDAR_COMMANDS_MAX (HAPI_SPIDAR_BOARDS * 61) /* bytes with padding */
 #define HAPI_SPIDAR_CURRENT_MAX 4095                       /* of 4096 per 3.3 V */
 
+/* What takes the force off all boards. */
+#define HAPI_SPIDAR_ZEROS_BEFORE 16 /* the currents of a B5M */
+#define HAPI_SPIDAR_ZEROS_MAX (HAPI_SPIDAR_ZEROS_BEFORE + HAPI_SPIDAR_COMMANDS_MAX)
+
 /* Boards in the order of their ids, which is that of the motors. */
 typedef struct hapi_spidar_boards {
   int count;

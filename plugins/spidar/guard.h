@@ -18,10 +18,6 @@
 #include "plugins/spidar/cycle.h"
 #include "plugins/spidar/identity.h"
 
-/* What takes the force off all boards. */
-#define HAPI_SPIDAR_ZEROS_BEFORE 16 /* the currents of a B5M */
-#define HAPI_SPIDAR_ZEROS_MAX (HAPI_SPIDAR_ZEROS_BEFORE + HAPI_SPIDAR_COMMANDS_MAX)
-
 /* Between the two, in memory that both have. */
 typedef struct hapi_spidar_pulse {
   atomic_uint beats;   /* goes up with every write of currents */

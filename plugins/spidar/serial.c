@@ -310,8 +310,8 @@ void hapi_spidar_serial_port(hapi_spidar_serial *serial, hapi_spidar_port *out)
 }
 
 /* Who is in the driver is out again in some us. One who has lost the processor needs the caller's,
- * so the caller sleeps. No wait for a write that this one interrupted, as a signal handler, and none
- * for other zeros, which may go in between. */
+ * so the caller sleeps. No wait for a write that this one interrupted, as a signal handler, and
+ * none for other zeros, which may go in between. */
 static bool writer_await(hapi_spidar_serial *serial)
 {
   const struct timespec pause = {0, WRITER_PAUSE_NS};

@@ -7,7 +7,6 @@
 
 #include <stdatomic.h>
 
-#include "plugins/spidar/guard.h"
 #include "plugins/spidar/identity.h"
 #include "plugins/spidar/line.h"
 

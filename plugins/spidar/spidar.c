@@ -100,9 +100,9 @@ static hapi_spidar_fit solve_pose(hapi_spidar_device *device)
   return hapi_spidar_solve(&device->belief.solver, &device->model, lengths);
 }
 
-/* Into pose and twist, at the time of the read before: boards answer with the positions of when they
- * were asked, and in a gap they are not. So a loop that was late is no doubt about the strings.
- * False: replies have been doubted for too long, while all strings were pulled. */
+/* Into pose and twist, at the time of the read before: boards answer with the positions of when
+ * they were asked, and in a gap they are not. So a loop that was late is no doubt about the
+ * strings. False: replies have been doubted for too long, while all strings were pulled. */
 static bool believe_counts(hapi_spidar_device *device, int64_t time_ns)
 {
   double counts[HAPI_SPIDAR_STRINGS_MAX];
@@ -126,8 +126,8 @@ static void to_frame(const hapi_spidar_device *device, hap_pose *pose, hap_twist
 {
   hap_pose now = device->belief.solver.pose;
   const hap_pose *grip = &now;
-  if (device->late > 0.0) {
-    hapi_pose_move(&now, &device->belief.twist, device->late);
+  if (device->reads.late > 0.0) {
+    hapi_pose_move(&now, &device->belief.twist, device->reads.late);
   }
   const double *r = device->settings.rotate;
   hapi_pose_point(device->settings.offset, r, grip->position, pose->position);
@@ -160,8 +160,9 @@ static bool needs_restart(const hapi_spidar_device *device)
 /* s, by which the newest positions are older than those of a loop that is in time. */
 static double late_by(const hapi_spidar_device *device, int64_t time_ns)
 {
-  double gap = device->read_ns >= 0 ? 1e-9 * (double)(time_ns - device->read_ns) : 0.0;
-  double late = gap - device->read_gap;
+  double gap =
+      device->reads.newest_ns >= 0 ? 1e-9 * (double)(time_ns - device->reads.newest_ns) : 0.0;
+  double late = gap - device->reads.gap;
   return late > LATE_LEAST_S && gap < HAPI_SAFETY_GAP_MOST_S ? late : 0.0;
 }
 
@@ -169,10 +170,10 @@ static double late_by(const hapi_spidar_device *device, int64_t time_ns)
 static hap_status take_answer(hapi_spidar_device *device, int64_t time_ns)
 {
   int taken = hapi_spidar_line_receive(&device->line);
-  int64_t asked_ns = device->read_ns >= 0 ? device->read_ns : time_ns;
-  device->late = late_by(device, time_ns);
-  device->read_gap = 1e-9 * (double)(time_ns - asked_ns);
-  device->read_ns = time_ns;
+  int64_t asked_ns = device->reads.newest_ns >= 0 ? device->reads.newest_ns : time_ns;
+  device->reads.late = late_by(device, time_ns);
+  device->reads.gap = 1e-9 * (double)(time_ns - asked_ns);
+  device->reads.newest_ns = time_ns;
   if (taken < 0) {
     return device_fail(device, HAPI_SPIDAR_HUNG_UP);
   }
@@ -458,9 +459,9 @@ static void reset_ticks(hapi_spidar_device *device)
   memset(device->current, 0, sizeof device->current);
   memset(device->rest, 0, sizeof device->rest);
   device->written = -1.0;
-  device->read_ns = -1;
-  device->read_gap = 0.0;
-  device->late = 0.0;
+  device->reads.newest_ns = -1;
+  device->reads.gap = 0.0;
+  device->reads.late = 0.0;
   device->poor = -1.0;
   device->doubted = false;
   device->asked = false;

@@ -45,6 +45,13 @@ typedef struct hapi_spidar_told {
   _Atomic int off_um; /* by how much */
 } hapi_spidar_told;
 
+/* When the loop reads. */
+typedef struct hapi_spidar_reads {
+  int64_t newest_ns; /* < 0: there was none since start */
+  double gap;        /* s, from the one before */
+  double late;       /* s, for which the believed pose is carried on: the loop was late */
+} hapi_spidar_reads;
+
 typedef struct hapi_spidar_device {
   hapi_spidar_serial serial;
   hapi_spidar_guard guard;
@@ -65,12 +72,10 @@ typedef struct hapi_spidar_device {
   _Atomic int cause;  /* hapi_spidar_cause, of now */
   hapi_spidar_told told;
   hapi_spidar_belief belief;
-  int64_t read_ns; /* of the newest read; < 0: there was none since start */
-  double read_gap; /* s, to the one before */
-  double late;     /* s, on which the believed pose is carried: the loop was late */
-  bool doubted;    /* the newest reply, or a string of it */
-  double poor;     /* s, when replies began to be doubted; < 0: they are not */
-  double taut;     /* s, when the strings began to be pulled after a zero */
+  hapi_spidar_reads reads;
+  bool doubted; /* the newest reply, or a string of it */
+  double poor;  /* s, when replies began to be doubted; < 0: they are not */
+  double taut;  /* s, when the strings began to be pulled after a zero */
   hapi_spidar_tensions tensions;
   hapi_spidar_heat heat;
   double written; /* s, of the newest write; < 0: the strings had no tension before */

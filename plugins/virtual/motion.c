@@ -48,7 +48,7 @@ static hap_status waypoints_read(hapi_motion *motion, const hapi_motion_text *te
   for (size_t i = 0; i < motion->count; ++i) {
     const char *end = memchr(at, ';', (size_t)(stop - at));
     end = end != NULL ? end : stop;
-    if (!waypoint_read(at, end, text->numbers, &motion->waypoints[i])) {
+    if (!waypoint_read(at, end, text->on_a_line ? 1 : 3, &motion->waypoints[i])) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                        "virtual: %s: waypoint %zu: expected %s, not '%.*s'", text->key, i + 1,
                        text->expected, (int)(end - at < 60 ? end - at : 60), at);

@@ -35,7 +35,7 @@ typedef struct hapi_motion_text {
   const char *expected;
   const char *text;
   size_t length;
-  int numbers; /* of a waypoint: 3, or 1 for motions along a line */
+  bool on_a_line; /* a waypoint has one number, and not three */
 } hapi_motion_text;
 
 /* Parses "T:x/y/z;T:x/y/z", or "T:x;T:x", into new waypoints, which hapi_motion_finish frees.

@@ -215,7 +215,7 @@ static hap_status set_motion(virtual_device *device, const hapi_argument *entrie
     return HAP_OK;
   }
   const hapi_motion_text text = {"path", "T:x/y/z in s and m (at most 1000 m)", entries[PATH].text,
-                                 entries[PATH].length, 3};
+                                 entries[PATH].length, false};
   return hapi_motion_set_path(motion, &text, detail);
 }
 
@@ -240,7 +240,7 @@ static hap_status set_turning(virtual_device *device, const hapi_argument *entri
     return HAP_OK;
   }
   const hapi_motion_text text = {"turn", "T:rx/ry/rz in s and rad", entries[TURN].text,
-                                 entries[TURN].length, 3};
+                                 entries[TURN].length, false};
   hap_status status = hapi_motion_set_path(turning, &text, detail);
   for (size_t i = 0; status >= HAP_OK && i < turning->count; ++i) {
     if (!(hapi_v3_norm(turning->waypoints[i].position) <= TURN_MOST)) {
@@ -366,7 +366,7 @@ static hap_status set_gripper(virtual_device *device, const hapi_argument *entri
     return HAP_OK;
   }
   const hapi_motion_text text = {"gripper", "T:x in s and m", entries[GRIPPER].text,
-                                 entries[GRIPPER].length, 1};
+                                 entries[GRIPPER].length, true};
   return hapi_motion_set_path(motion, &text, detail);
 }
 

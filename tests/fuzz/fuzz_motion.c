@@ -61,7 +61,7 @@ void fuzz_one(const uint8_t *data, size_t size)
                         .loop = (data[0] & 2) != 0};
   hap_detail detail;
   fuzz_detail_spoil(&detail);
-  const hapi_motion_text path = {"path", "T:x/y/z", text, strlen(text), 3};
+  const hapi_motion_text path = {"path", "T:x/y/z", text, strlen(text), false};
   hap_status status = hapi_motion_set_path(&motion, &path, &detail);
   fuzz_check_answer(status, status >= HAP_OK ? &motion : NULL, &detail);
   if (status >= HAP_OK) {

@@ -64,12 +64,12 @@ static hap_status check_boards(const emulator_def *def, hap_detail *detail)
 static hap_status set_motions(emulator *e, const emulator_def *def, hap_detail *detail)
 {
   const char *path = def->path != NULL ? def->path : default_path;
-  const hapi_motion_text text = {"path", "T:x/y/z;... in s and m", path, strlen(path)};
+  const hapi_motion_text text = {"path", "T:x/y/z;... in s and m", path, strlen(path), false};
   e->path.loop = e->turn.loop = true;
   hap_status status = hapi_motion_set_path(&e->path, &text, detail);
   if (status >= HAP_OK && def->turn != NULL) {
-    const hapi_motion_text turn = {"turn", "T:x/y/z;... in s and rad", def->turn,
-                                   strlen(def->turn)};
+    const hapi_motion_text turn = {"turn", "T:x/y/z;... in s and rad", def->turn, strlen(def->turn),
+                                   false};
     status = hapi_motion_set_path(&e->turn, &turn, detail);
   }
   return status;
