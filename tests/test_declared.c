@@ -190,3 +190,22 @@ TEST(a_torque_without_power_only_brakes)
     CHECK_NEAR(w.force[0], 4.0, 0.0); /* it stands still: nothing flows */
   }
 }
+
+/* Half of what it may give in 100 ms: half of the force, until the debt is forgiven. */
+TEST(who_gave_too_much_pays_with_force)
+{
+  const hapi_promise promise = {10.0, 1.0, 2.0};
+  const hapi_declared still = {.any = false};
+  double before = 0.0;
+  hapi_purse purse = {.joules = -0.1};
+  for (int i = 0; i < 400; ++i) {
+    hap_wrench w = {{4.0, 0.0, 0.0}, {0.0, 0.0, 0.4}};
+    double owed = hapi_min(purse.joules + 2.0 * T, 0.0);
+    CHECK(hapi_promise_keep(&promise, &purse, &still, T, &w) == (owed < 0.0));
+    CHECK_NEAR(w.force[0], 4.0 * (1.0 + owed / 0.2), 1e-12);
+    CHECK_NEAR(w.torque[2], 0.4 * (1.0 + owed / 0.2), 1e-12);
+    CHECK(w.force[0] >= before);
+    before = w.force[0];
+  }
+  CHECK(before == 4.0);
+}
