@@ -95,6 +95,9 @@ static double count_read(FILE *in)
   return count;
 }
 
+/* The loop calls the two halves of a tick. */
+static const char inside_tick[] = "hapi_tick_read --toggle-collect=hapi_tick_answer";
+
 /* Of a tick with effects as name=state, in the function inside with all that it calls; -1:
  * unknown. */
 static double effects_count(const char *in_scene, const char *name, const char *state,
@@ -534,7 +537,7 @@ static void print_each(const subject *s)
         const effects_result *r = &s->variants[next++].result;
         const char *state = hap_effect_wish_name((hap_effect_wish)w);
         double count =
-            s->counts ? effects_count(s->name, name, state, "hapi_tick_run", COUNT_TICKS) : -1.0;
+            s->counts ? effects_count(s->name, name, state, inside_tick, COUNT_TICKS) : -1.0;
         print_row(s,
                   &(row){name, state, reason_of(r, i), count, effects_difference(automatic, r),
                          &r->effects[i]},
@@ -659,9 +662,9 @@ static void check_off(sweep *s)
   }
   for (size_t i = 0; i < (s->bench->quick ? 1 : BENCH_COUNT(effects)); ++i) {
     const char *name = hap_effect_name(effects[i]);
-    double off = effects_count(in, name, "off", "hapi_tick_run", COUNT_TICKS);
-    double automatic = effects_count(in, name, "auto", "hapi_tick_run", COUNT_TICKS);
-    double on = effects_count(in, name, "on", "hapi_tick_run", COUNT_TICKS);
+    double off = effects_count(in, name, "off", inside_tick, COUNT_TICKS);
+    double automatic = effects_count(in, name, "auto", inside_tick, COUNT_TICKS);
+    double on = effects_count(in, name, "on", inside_tick, COUNT_TICKS);
     if (!(off > 0.0) || !(automatic > 0.0) || !(on > 0.0)) {
       bench_skip(s->bench, "%s: its instructions could not be counted", name);
       continue;

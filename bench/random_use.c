@@ -13,6 +13,8 @@
 #include <hapode/ode.h>
 #include <hapode/research.h>
 
+#include "bench/random_hands.h"
+
 #define BODIES 20
 #define GEOMS 3 /* of a body */
 #define JOINTS 14
@@ -53,6 +55,7 @@ typedef struct use {
   hap_session *session;
   bool started;
   int posted; /* edits that have not run */
+  random_hands hands;
   uint64_t tick;
 } use;
 
@@ -1508,6 +1511,22 @@ static void world_hash(use *u)
   }
 }
 
+/* Every other program has hands that do more than push. */
+static void hands_change(use *u)
+{
+  random_hands *h = &u->hands;
+  if (u->def->seed % 2 == 0) {
+    return;
+  }
+  uint64_t throws = h->dice >> 32;
+  const use_pointer *p = &u->pointers[throws % POINTERS];
+  if (throws / 8 % 4 == 0) {
+    random_hands_change(h, u->session, p->id, u->bodies[throws / 64 % BODIES].body);
+  }
+  random_hands_ask(h, u->session, p->id);
+  hash_word(u, h->hash);
+}
+
 static void use_advance(use *u)
 {
   uint64_t ticks = 1 + (uint64_t)dice_below(u, 12);
@@ -1528,6 +1547,7 @@ static void use_advance(use *u)
   if (dice_chance(u, 0.01)) {
     session_restart(u);
   }
+  hands_change(u);
   EXPECT(u, hap_session_advance(u->session, ticks));
   u->tick += ticks;
   bodies_calm(u);
@@ -1586,6 +1606,7 @@ hap_status random_use_run(const random_use_def *def, random_use_result *out, hap
   for (int i = 0; i < 8; ++i) {
     (void)dice_next(u);
   }
+  random_hands_begin(&u->hands, def->seed);
   hap_status status = HAP_OK;
   world_open(u);
   for (int i = 0; i < POINTERS && status >= HAP_OK; ++i) {
@@ -1615,6 +1636,7 @@ hap_status random_use_run(const random_use_def *def, random_use_result *out, hap
     EXPECT(u, hap_session_stop(u->session));
     session_note(u);
   }
+  out->unexpected += u->hands.bad;
   hap_session_destroy(u->session);
   for (int i = 0; i < POINTERS; ++i) {
     hap_device_close(u->pointers[i].device);
