@@ -163,7 +163,8 @@ static void settings_change(random_hands *h, hap_session *session, hap_pointer_i
       {0.01, 0.0, 0.0}, {-0.01, 0.01, 0.0}, {-0.01, -0.01, 0.0}, {0.0, 0.0, 0.015}};
   hap_pointer_settings s;
   hap_pointer_settings_init(&s, sizeof s);
-  s.mask = 1u << dice_below(h, 13) | 1u << dice_below(h, 13); /* one bit is unknown */
+  s.mask = 1u << dice_below(h, 13); /* one bit is unknown */
+  s.mask |= 1u << dice_below(h, 13);
   pose_make(h, 0.1, &s.pose_world_device);
   dice_fill(h, 0.3, 3, s.twist_world_device.linear);
   dice_fill(h, 1.0, 3, s.twist_world_device.angular);

@@ -196,8 +196,8 @@ def check_trigger_volume(program):
 
 
 def check_follow_a_path(program):
-    rows = rows_of(run(program), r"^ *\d+ ms: at +(-?[0-9.]+) +(-?[0-9.]+) mm, +(\d+) % of the way, "
-                                 r"+([0-9.]+) mm off$")
+    rows = rows_of(run(program), r"^ *\d+ ms: at +(-?[0-9.]+) +(-?[0-9.]+) mm, "
+                                 r"+(\d+) % of the way, +([0-9.]+) mm off$")
     point(len(rows) == 10 and int(rows[-1][2]) >= 99, "the pupil comes to the end", str(rows))
     point(all(float(row[3]) < 3.0 for row in rows), "and stays near the way", str(rows))
 

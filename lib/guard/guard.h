@@ -58,4 +58,10 @@ typedef struct hapi_guard {
   hapi_fault_latch latch;
 } hapi_guard;
 
+/* N/m, of the pointer or of what it may touch. */
+static inline double hapi_pointer_stiffest(const hapi_pointer *p)
+{
+  return p->surface.stiffness > p->surface.hardest ? p->surface.stiffness : p->surface.hardest;
+}
+
 #endif

@@ -27,8 +27,8 @@ bool hapi_told_create(hapi_haptic *haptic)
   told->contacts = hapi_alloc_array((size_t)3 * c->contacts, sizeof *told->contacts);
   hapi_own_hands *hands = &told->hands;
   hands->of = hapi_alloc_array(c->pointers, sizeof *hands->of);
-  hands->list = hapi_alloc_array(c->pointers, sizeof *hands->list);
-  hands->touches = hapi_alloc_array((size_t)HAP_TOUCHES_MAX * c->pointers, sizeof *hands->touches);
+  hands->list = hapi_alloc_array(c->pointers, sizeof(void *));
+  hands->touches = hapi_alloc_array((size_t)HAP_TOUCHES_MAX * c->pointers, sizeof(void *));
   return hands->of != NULL && hands->list != NULL && hands->touches != NULL &&
          told->telling.events.rows != NULL && told->telling.lists != NULL &&
          told->of_pointers != NULL && told->touches != NULL && told->contacts != NULL;

@@ -499,7 +499,7 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
     }
     c->row = HAPI_NO_ROW;
     touches->close += c->tool == 0 && c->ramp.depth > -CLOSE;
-    if (pointers->grabs) {
+    if (placed && pointers->grabs) {
       double touches_by = hapi_held_touches_by(at.pointer, c);
       at.share *= touches_by;
       c->hidden = c->hidden || touches_by <= 0.0;

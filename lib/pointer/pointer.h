@@ -283,12 +283,6 @@ typedef struct hapi_pointer {
   hapi_grab grab;
 } hapi_pointer;
 
-/* N/m, of the pointer or of what it may touch. */
-static inline double hapi_pointer_stiffest(const hapi_pointer *p)
-{
-  return p->surface.stiffness > p->surface.hardest ? p->surface.stiffness : p->surface.hardest;
-}
-
 typedef struct hapi_pointers {
   hapi_pointer *of;      /* capacity.pointers */
   hapi_tool_hull *hulls; /* likewise */
