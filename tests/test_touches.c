@@ -544,6 +544,32 @@ TEST(the_first_call_begins_it_and_says_so)
   CHECK(hap_session_contacts(d->session, &contact, 1, sizeof contact, &count) == HAP_END);
 }
 
+TEST(another_geom_at_the_same_address_is_touched_anew)
+{
+  hap_event events[EVENTS];
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dGeomID tile = dCreateBox(d->space, 0.1, 0.1, 0.02);
+  dGeomSetPosition(tile, 0.0, 0.0, -0.01);
+  desk_run(d, 0.0, 0.0, RADIUS - 0.001);
+  desk_listen(d);
+  desk_wait(d, 100);
+  (void)events_of(d, events);
+  REQUIRE(hap_session_lock(d->session) == HAP_OK);
+  CHECK(hap_session_forget_geom(d->session, tile) == HAP_OK);
+  dGeomDestroy(tile);
+  dGeomID other = dCreateBox(d->space, 0.1, 0.1, 0.02);
+  dGeomSetPosition(other, 0.0, 0.0, -0.01);
+  REQUIRE(hap_session_unlock(d->session) == HAP_OK);
+  desk_wait(d, 100);
+  size_t count = events_of(d, events);
+  int kinds[HAP_EVENT_LET_GO + 1] = {0};
+  for (size_t i = 0; i < count; ++i) {
+    ++kinds[events[i].kind];
+  }
+  printf("# at %s address\n", other == tile ? "the same" : "another");
+  CHECK(kinds[HAP_EVENT_RELEASE] == 1 && kinds[HAP_EVENT_TOUCH] == 1);
+}
+
 TEST(structs_of_other_builds_and_wrong_calls_are_met)
 {
   struct {

@@ -194,6 +194,7 @@ static void tool_add(hapi_touches *touches, const hapi_bodies *bodies, const hap
   c->pointer = in->pointer;
   c->pointer_generation = in->pointer_generation;
   c->asked.geom = in->geom;
+  c->asked.number = in->at.key;
   const hapi_feel_told told = {in->mu, in->feel, wishes, old != HAPI_SLOT_NONE};
   hapi_touch_feel_adopt(touches, &told, c);
   c->tool = at + 1;

@@ -71,7 +71,8 @@ typedef struct hapi_touch_shape {
   hapi_shape shape;
   hap_pose pose; /* body frame */
   hapi_tag geom;
-  hapi_told told; /* of its surface, into hapi_touches.triangles; where it is no shape */
+  uint64_t number; /* of the geom, beside its address, which another one may get */
+  hapi_told told;  /* of its surface, into hapi_touches.triangles; where it is no shape */
 } hapi_touch_shape;
 
 /* How a contact is felt in this tick. */

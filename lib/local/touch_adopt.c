@@ -42,6 +42,7 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
   memcpy(out->response.a, in->a, sizeof out->response.a);
   memcpy(out->response.turn, in->turn, sizeof out->response.turn);
   out->asked.geom = in->geom;
+  out->asked.number = in->geom_number;
   out->weight = 1.0;
   out->asked.has = in->has_shape != 0;
   out->is_hidden = in->hidden != 0;

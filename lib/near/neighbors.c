@@ -503,6 +503,8 @@ static void take_hit(hapi_nearby *nearby, const hapi_hit *hit)
   contact->wanted = true;
   place_contact(nearby, contact, hit, pointer);
   contact->said = (hapi_contact_said){hit->mu, hit->feel};
+  contact->geom_number =
+      hapi_geom_names_get(&nearby->tools.names, hit->geom, nearby->cycle->model_number + 1);
   if (body != NULL) {
     take_body(&nearby->slots.bodies[slot], body);
   }

@@ -230,6 +230,7 @@ static void fill_contact(const hapi_contact_slot *slot, const hapi_contact_answe
   memcpy(out->a, answer->a, sizeof out->a);
   memcpy(out->turn, answer->turn, sizeof out->turn);
   out->geom = slot->geom;
+  out->geom_number = slot->geom_number;
   out->mu = slot->said.mu;
   out->feel = slot->said.feel;
   out->has_shape = slot->has_shape;

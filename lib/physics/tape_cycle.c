@@ -213,7 +213,8 @@ static uint64_t hash_measured(uint64_t hash, const hapi_measured_joint *m)
 static uint64_t hash_feel(uint64_t hash, const hapi_model_feel *of)
 {
   const hapi_feel *feel = &of->feel;
-  const double values[] = {feel->mu, feel->mu_static, feel->stiffness, feel->damping};
+  const double values[] = {feel->mu,           feel->mu_static,    feel->stiffness, feel->damping,
+                           feel->impact.force, feel->impact.decay, feel->impact.hz};
   hash = hapi_hash_word(hash, ((uint64_t)of->number << 32) | feel->more);
   hash = hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
   hash = hapi_hash_word(hash, feel->texture_number);

@@ -202,7 +202,8 @@ typedef struct hapi_model_contact {
   hap_pose shape_pose;   /* in the body's frame */
   uint32_t tool;         /* of a hull: 1 + index into the model's tool points; 0: of a sphere */
   hapi_tag geom;
-  hapi_told told; /* of the surface, where it is told in triangles */
+  uint64_t geom_number; /* of a sphere: no other geom near the pointers has it */
+  hapi_told told;       /* of the surface, where it is told in triangles */
 } hapi_model_contact;
 
 /* Of a pointer and a geom near it. */

@@ -95,7 +95,7 @@ static hapi_felt *felt_of(const listening *at, const hapi_local_contact *c)
 {
   hapi_felt_list *list = at->list;
   for (uint32_t i = 0; i < list->count; ++i) {
-    if (list->of[i].told.geom == c->asked.geom) {
+    if (list->of[i].told.geom == c->asked.geom && list->of[i].number == c->asked.number) {
       return &list->of[i];
     }
   }
@@ -105,6 +105,7 @@ static hapi_felt *felt_of(const listening *at, const hapi_local_contact *c)
   hapi_felt *felt = &list->of[list->count++];
   memset(felt, 0, sizeof *felt);
   felt->told.geom = c->asked.geom;
+  felt->number = c->asked.number;
   return felt;
 }
 

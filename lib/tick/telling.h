@@ -24,14 +24,15 @@ typedef struct hapi_event_ring {
 /* A touch, from its begin to its release. */
 typedef struct hapi_felt {
   hap_touch told;
-  uint32_t slot; /* of the body; HAPI_SLOT_NONE: static world */
-  bool pushes;   /* in this tick */
-  bool begun;    /* it was told */
-  bool strikes;  /* its first blow is not over */
-  bool rubs;     /* in this tick; scratch, with the next two */
-  bool slips;    /* some point of it is let go by friction */
-  double weight; /* N, sum over its points */
-  double speed;  /* m/s, at which it closed */
+  uint64_t number; /* of the geom */
+  uint32_t slot;   /* of the body; HAPI_SLOT_NONE: static world */
+  bool pushes;     /* in this tick */
+  bool begun;      /* it was told */
+  bool strikes;    /* its first blow is not over */
+  bool rubs;       /* in this tick; scratch, with the next two */
+  bool slips;      /* some point of it is let go by friction */
+  double weight;   /* N, sum over its points */
+  double speed;    /* m/s, at which it closed */
   double impulse;
   int64_t pushed_ns; /* the last tick that it pushed in */
   int64_t slid_ns;   /* likewise, that it slid in */
