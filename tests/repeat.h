@@ -191,7 +191,7 @@ static inline uint64_t repeat_hash_contacts(const hapi_physics *physics)
     const hapi_contact_slot *contact = &physics->near.slots.contacts[i];
     hash = hapi_hash_word(hash, ((uint64_t)contact->generation << 32) | contact->phase);
     hash = hapi_hash_doubles(hash, contact->point_world, 3);
-    hash = hapi_hash_doubles(hash, contact->last_force, 3);
+    hash = hapi_hash_doubles(hash, contact->last_touch.force, 3);
   }
   return hash;
 }

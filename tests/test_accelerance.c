@@ -55,7 +55,7 @@ static hapi_contact_slot *measure_contact(test_world *w, dBodyID body, double fo
 {
   hapi_contact_slot *contact = world_contact(w, body, 0);
   REQUIRE(contact != NULL);
-  hapi_v3_set(contact->last_force, 0.0, 0.0, -force);
+  hapi_v3_set(contact->last_touch.force, 0.0, 0.0, -force);
   world_probe(w);
   return contact;
 }

@@ -398,7 +398,7 @@ static void open_floor(on_floor *f, hap_probe probe, double side)
 
 static void measure_with(on_floor *f, double x, double z, double speed)
 {
-  hapi_v3_set(f->contact->last_force, x, 0.0, z);
+  hapi_v3_set(f->contact->last_touch.force, x, 0.0, z);
   f->contact->speed = speed;
   blocks_measure(&f->w);
 }
@@ -407,7 +407,7 @@ static void measure_with(on_floor *f, double x, double z, double speed)
 static double with_force(const on_floor *f, int row)
 {
   return world_answer(&f->w, f->slot)->b[row] +
-         hapi_v3_dot(world_contact_answer(&f->w, f->contact)->a[row], f->contact->last_force);
+         hapi_v3_dot(world_contact_answer(&f->w, f->contact)->a[row], f->contact->last_touch.force);
 }
 
 TEST(a_cube_that_friction_holds_gives_no_way)
@@ -447,7 +447,7 @@ TEST(a_cube_that_slides_answers_with_its_mass)
     CHECK_NEAR(world_contact_answer(&f.w, f.contact)->a[0][0], 1.0 / MASS, 1e-3 / MASS);
     CHECK_NEAR(world_answer(&f.w, f.slot)->b[0], -side * MU * GRAVITY, 5e-3 * GRAVITY);
     CHECK_NEAR(with_force(&f, 0), force / MASS - side * MU * GRAVITY, 1e-3 * GRAVITY);
-    CHECK_NEAR(f.contact->last_force[0], force, 0.0);
+    CHECK_NEAR(f.contact->last_touch.force[0], force, 0.0);
     world_close(&f.w);
   }
 }
@@ -462,7 +462,7 @@ TEST(b_and_the_forces_make_the_base_again)
   physics->cycle.settings.probe = HAP_PROBE_OPERATING;
   hapi_contact_slot *contact = world_contact(w, w->bodies[0], 0);
   REQUIRE(contact != NULL && block_of(w, w->bodies[0], w->bodies[1]) != NULL);
-  hapi_v3_set(contact->last_force, 3.0, 0.0, 0.0);
+  hapi_v3_set(contact->last_touch.force, 3.0, 0.0, 0.0);
   blocks_measure(w);
   base[0] = world_answer(w, world_slot(w, w->bodies[0]))->b[0] +
             3.0 * world_contact_answer(w, contact)->a[0][0];

@@ -44,8 +44,9 @@ typedef struct hapi_body_slot {
   double exchanged[6]; /* N, N m: mean wrench from the loop in the last interval */
 } hapi_body_slot;
 
-/* How a sphere touched at the newest message of the loop. */
+/* How a pointer touched at the newest message of the loop; all but the force of a sphere alone. */
 typedef struct hapi_last_touch {
+  double force[3];  /* N, on the body */
   bool touched;     /* what follows holds */
   uint32_t epoch;   /* of the body, when the model was made */
   double depth;     /* m, of the pointer in the geom */
@@ -82,7 +83,6 @@ typedef struct hapi_contact_slot {
   double stiffness;      /* N/m, the pointer's */
   hapi_contact_said said;
   double finger_radius; /* m, the pointer's; 0: no torsion */
-  double last_force[3]; /* on the body, newest message */
   hapi_last_touch last_touch;
   bool is_tool; /* a point of a hull's patch */
   hapi_tool_point tool;

@@ -191,8 +191,8 @@ void hapi_reconcile_take(hapi_account *account)
   }
   const hapi_state_contact *in = hapi_state_contacts(account->cycle->state);
   for (uint32_t i = 0; i < account->slots->contact_high; ++i) {
-    memset(account->slots->contacts[i].last_force, 0,
-           sizeof account->slots->contacts[i].last_force);
+    memset(account->slots->contacts[i].last_touch.force, 0,
+           sizeof account->slots->contacts[i].last_touch.force);
     account->slots->contacts[i].last_touch.touched = false;
   }
   for (uint32_t i = 0; i < account->cycle->state->contact_count; ++i) {
@@ -200,7 +200,7 @@ void hapi_reconcile_take(hapi_account *account)
     hapi_contact_slot *contact = &account->slots->contacts[in[i].slot];
     if (contact->phase == HAPI_SLOT_LIVE && contact->generation == in[i].generation &&
         hapi_finite(in[i].force, 3)) {
-      hapi_v3_copy(in[i].force, contact->last_force);
+      hapi_v3_copy(in[i].force, contact->last_touch.force);
       contact->last_touch.touched = in[i].touches != 0 && hapi_finite(&in[i].depth, 1) &&
                                     hapi_finite(in[i].ball, 3) && hapi_finite(in[i].normal, 3);
       contact->last_touch.depth = in[i].depth;

@@ -81,7 +81,7 @@ static double contact_push(const hapi_probe *probe, const hapi_contact_slot *con
   if (at_operating_point(probe)) {
     return least;
   }
-  double last = hapi_v3_norm(contact->last_force);
+  double last = hapi_v3_norm(contact->last_touch.force);
   double touch = contact->speed * sqrt(contact->stiffness * mass);
   double wanted = last > 0.0 ? last : touch;
   return wanted > least ? wanted : least; /* less would drown in the solver's rounding */
@@ -107,7 +107,7 @@ static void contacts_begin_step(hapi_probe *probe)
   hapi_test_rewind(&probe->test);
   for (uint32_t i = 0; i < pushed->count && at_operating_point(probe); ++i) {
     const hapi_contact_slot *contact = &probe->slots->contacts[pushed->slots[i]];
-    contact_add_force(probe, contact, contact->last_force);
+    contact_add_force(probe, contact, contact->last_touch.force);
   }
 }
 
@@ -405,7 +405,7 @@ static void forces_take_out(hapi_probe *probe, const hapi_contact_watch *watch)
     const hapi_contact_answer *answer = &probe->answers.contacts[index];
     hapi_body_answer *body = &probe->answers.bodies[contact->body];
     for (int k = 0; k < 6 && body->b_is_good; ++k) {
-      body->b[k] -= hapi_v3_dot(answer->a[k], contact->last_force);
+      body->b[k] -= hapi_v3_dot(answer->a[k], contact->last_touch.force);
     }
   }
   for (uint32_t i = 0; watch != NULL && i < probe->slots->body_high; ++i) {

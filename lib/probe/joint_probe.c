@@ -193,11 +193,11 @@ static void pair_begin_step(const pair *p)
     uint32_t slot = index == HAPI_NONE ? HAPI_NONE : p->probe->world->bodies.entries[index].slot;
     for (uint32_t k = 0; k < p->probe->slots->contact_high && slot != HAPI_NONE; ++k) {
       const hapi_contact_slot *c = &p->probe->slots->contacts[k];
-      if (c->phase == HAPI_SLOT_LIVE && c->body == slot && hapi_finite(c->last_force, 3)) {
+      if (c->phase == HAPI_SLOT_LIVE && c->body == slot && hapi_finite(c->last_touch.force, 3)) {
         double at[3];
         hapi_pose_point(to->position, to->quat_wxyz, c->point_body, at);
-        dBodyAddForceAtPos(p->bodies[i], c->last_force[0], c->last_force[1], c->last_force[2],
-                           at[0], at[1], at[2]);
+        dBodyAddForceAtPos(p->bodies[i], c->last_touch.force[0], c->last_touch.force[1],
+                           c->last_touch.force[2], at[0], at[1], at[2]);
       }
     }
   }

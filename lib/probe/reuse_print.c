@@ -292,7 +292,7 @@ static void print_pushed_contact(printer *p, uint32_t index)
   print_value(p, contact->finger_radius, SAME);
   print_vector(p, contact->point_body, 3, 1.0);
   print_vector(p, contact->normal_body, 3, m.arm);
-  print_vector(p, contact->last_force, 3, m.force);
+  print_vector(p, contact->last_touch.force, 3, m.force);
   print_value(p, answer->push, m.force);
 }
 

@@ -178,7 +178,7 @@ static void cross_begin(void *user, const hapi_reuse_book *book)
   }
 }
 
-/* What last_force does to the body by the blocks. Of a body that is not under test b was used
+/* What the last force does to the body by the blocks. Of a body that is not under test b was used
  * again, with nothing in it of what the block adds. */
 static void cross_take_out(void *user, uint32_t body, double io_b[6])
 {
@@ -186,7 +186,7 @@ static void cross_take_out(void *user, uint32_t body, double io_b[6])
   int64_t begin_ns = hapi_clock_now();
   for (uint32_t i = 0; i < cross->block_count; ++i) {
     const hapi_cross_block *block = &cross->blocks[i];
-    const double *force = cross->slots->contacts[block->contact].last_force;
+    const double *force = cross->slots->contacts[block->contact].last_touch.force;
     for (int k = 0; k < 6 && block->body == body && block_holds(cross, block); ++k) {
       io_b[k] -= hapi_v3_dot(block->a[k], force);
     }
