@@ -45,7 +45,7 @@ const char *hap_event_name(hap_event_kind kind)
       [HAP_EVENT_SLIDE] = "slide",         [HAP_EVENT_STICK] = "stick",
       [HAP_EVENT_IMPACT] = "impact",       [HAP_EVENT_BUTTON] = "button",
       [HAP_EVENT_FAULT] = "fault",         [HAP_EVENT_GRIPPER] = "gripper",
-      [HAP_EVENT_FORCE_OUT] = "force_out", [HAP_EVENT_HOLD] = "hold",
+      [HAP_EVENT_FORCE_OUT] = "force-out", [HAP_EVENT_HOLD] = "hold",
       [HAP_EVENT_LET_GO] = "let-go",
   };
   size_t at = (size_t)kind;
