@@ -178,6 +178,35 @@ TEST(all_together_are_bounded)
   CHECK(most <= 5.0 + 1e-9 && most > 4.0);
 }
 
+/* A hand that springs with the vibration, so that each half of it gives: the mean stays at 1 W, and
+ * the purse of 0.1 s is spent once. */
+TEST(a_hand_that_goes_with_it_gets_no_more_than_the_power)
+{
+  struck s;
+  desk *d = struck_desk(HAP_MODEL_CONTACT, &s);
+  s.force = 1000.0;
+  s.decay = 10.0;
+  s.hz = 20.0;
+  floor_add(d);
+  desk_run(d, 0.0, 0.0, RADIUS + 0.001);
+  desk_wait(d, 1);
+  hand_fall(d, 2.0, T);
+  double work = 0.0;
+  double most = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    double force = own_of(d).force[2];
+    double way = 5e-4 * (force > 0.0 ? 1.0 : -1.0);
+    work += force * way;
+    most = fmax(most, work - 1e-3 * i);
+    d->velocity[2] = way / T;
+    d->at[2] += way;
+    hand_lead(d);
+    REQUIRE(hap_session_advance(d->session, 1) == HAP_OK);
+  }
+  printf("# %.3f J in 0.3 s, %.3f J above 1 W at most\n", work, most);
+  CHECK(most <= 0.15 && work > 0.05);
+}
+
 typedef struct bad_row {
   const char *name;
   struck says;

@@ -31,8 +31,9 @@ typedef struct hap_surface {
   double friction_dynamic;
   uint32_t texture; /* of hap_session_add_texture; 0, as it comes: smooth */
   /* What the material sounds like to the hand: at a touch with the speed v the hand feels
-   * impact_force v exp(-impact_decay t) sin(2 pi impact_hz t) along the normal, at most 5 N in all,
-   * beside the contact's force. The body does not. It begins in the tick of the touch. */
+   * impact_force v exp(-impact_decay t) sin(2 pi impact_hz t) along the normal, beside the
+   * contact's force; at most 5 N and 1 W in all. The body does not. It begins in the tick of the
+   * touch. */
   double impact_force; /* N s/m, 0..1000; 0, as it comes: none */
   double impact_decay; /* 1/s, 10..10000; comes with 80 */
   double impact_hz;    /* Hz, 5..1000 and at most a fourth of haptic_hz; comes with 100 */

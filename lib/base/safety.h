@@ -71,6 +71,7 @@
 #define HAPI_SAFETY_CONTACT_PRESS_MOST 10.0 /* m/s */
 #define HAPI_SAFETY_TEXTURE_HEIGHT 0.003    /* m */
 #define HAPI_SAFETY_IMPACT_FORCE 5.0        /* N */
+#define HAPI_SAFETY_IMPACT_POWER 1.0        /* W */
 
 /* ---- a grip ---- */
 #define HAPI_SAFETY_GRAB_SPEED 0.5  /* m/s */

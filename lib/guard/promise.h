@@ -16,11 +16,6 @@ typedef struct hapi_promise {
   double power;  /* W, at most as a mean over HAPI_SAFETY_POWER_S; 0: it takes energy alone */
 } hapi_promise;
 
-typedef struct hapi_purse {
-  double joules; /* that it may give */
-  hap_wrench last;
-} hapi_purse;
-
 /* Full: what comes has not yet given anything. */
 void hapi_purse_fill(hapi_purse *purse, const hapi_promise *promise);
 

@@ -17,6 +17,12 @@
 
 #include "base/vec.h"
 
+/* Of what gives energy by a promise of its power: guard/promise.h. */
+typedef struct hapi_purse {
+  double joules; /* that it may give */
+  hap_wrench last;
+} hapi_purse;
+
 typedef struct hapi_declared {
   bool any;  /* in this tick */
   bool was;  /* in the tick before */

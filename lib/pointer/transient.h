@@ -32,6 +32,7 @@ typedef struct hapi_transient {
 /* Zeroed: none. */
 typedef struct hapi_transients {
   bool any;
+  hapi_purse purse;
   hapi_transient of[HAPI_TRANSIENTS];
 } hapi_transients;
 
@@ -87,10 +88,10 @@ static inline void hapi_transient_begin(hapi_transients *list, const hapi_impact
   list->any = true;
 }
 
-/* Once a tick, after the touches of the tick were found. */
-static inline void hapi_transients_declare(hapi_transients *list, hapi_declared *declared)
+/* Once a tick, after the touches of the tick were found. *out_force: N, of all, world. */
+static inline void hapi_transients_next(hapi_transients *list, double out_force[3])
 {
-  hap_wrench wrench = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  hapi_v3_set(out_force, 0.0, 0.0, 0.0);
   list->any = false;
   for (uint32_t i = 0; i < HAPI_TRANSIENTS; ++i) {
     hapi_transient *t = &list->of[i];
@@ -98,12 +99,10 @@ static inline void hapi_transients_declare(hapi_transients *list, hapi_declared 
       memset(t->z, 0, sizeof t->z);
       continue;
     }
-    hapi_v3_madd(wrench.force, t->z[1], t->way, wrench.force);
+    hapi_v3_madd(out_force, t->z[1], t->way, out_force);
     hapi_complex_times(t->z, t->turn, t->z);
     list->any = true;
   }
-  (void)hapi_v3_shorten(wrench.force, HAPI_SAFETY_IMPACT_FORCE);
-  hapi_declare_driven(declared, &wrench);
 }
 
 #endif

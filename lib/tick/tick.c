@@ -5,11 +5,13 @@
 #include <string.h>
 
 #include "base/hash.h"
+#include "base/safety.h"
 #include "base/vec.h"
 #include "guard/energy_observer.h"
 #include "guard/force_guard.h"
 #include "guard/lateness.h"
 #include "guard/oscillation.h"
+#include "guard/promise.h"
 #include "local/grab_place.h"
 #include "local/grab_rows.h"
 #include "paper/local_dynamics.h"
@@ -211,7 +213,13 @@ static void transients_declare(hapi_tick *tick)
     if (tick->facts.faulted || p->generation == 0) {
       memset(&p->transients, 0, sizeof p->transients);
     } else {
-      hapi_transients_declare(&p->transients, &p->declared);
+      const hapi_promise promise = {.force = HAPI_SAFETY_IMPACT_FORCE,
+                                    .power = HAPI_SAFETY_IMPACT_POWER};
+      hap_wrench wrench = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+      hapi_transients_next(&p->transients, wrench.force);
+      p->declared.held |= hapi_promise_keep(&promise, &p->transients.purse, &p->declared,
+                                            tick->facts.period, &wrench);
+      hapi_declare_driven(&p->declared, &wrench);
     }
   }
 }
