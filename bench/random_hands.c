@@ -11,47 +11,25 @@
 #include <hapode/pointer_set.h>
 #include <hapode/touches.h>
 
+#include "bench/dice.h"
+
 #define EVENTS 64
-
-static uint64_t dice_next(random_hands *h)
-{
-  h->dice ^= h->dice << 13;
-  h->dice ^= h->dice >> 7;
-  h->dice ^= h->dice << 17;
-  return h->dice;
-}
-
-static double dice_between(random_hands *h, double low, double high)
-{
-  return low + (high - low) * (double)(dice_next(h) >> 11) * 0x1p-53;
-}
-
-static uint32_t dice_below(random_hands *h, uint32_t count)
-{
-  return (uint32_t)((dice_next(h) >> 33) % count);
-}
-
-static void dice_fill(random_hands *h, double most, int count, double *out)
-{
-  for (int i = 0; i < count; ++i) {
-    out[i] = dice_between(h, -most, most);
-  }
-}
 
 /* Up to most, and now and then what no call may take. */
 static double dice_number(random_hands *h, double most)
 {
   static const double odd[] = {-1.0, INFINITY, -INFINITY, NAN, 1e300, 1e-300, 0.0, -0.0};
-  return dice_below(h, 64) == 0 ? odd[dice_below(h, 8)] : dice_between(h, 0.0, most);
+  return dice_below(&h->dice, 64) == 0 ? odd[dice_below(&h->dice, 8)]
+                                       : dice_between(&h->dice, 0.0, most);
 }
 
 static void pose_make(random_hands *h, double most, hap_pose *out)
 {
-  double angle = dice_between(h, -1.0, 1.0);
-  dice_fill(h, most, 3, out->position);
+  double angle = dice_between(&h->dice, -1.0, 1.0);
+  dice_fill(&h->dice, -most, most, 3, out->position);
   memset(out->quat_wxyz, 0, sizeof out->quat_wxyz);
   out->quat_wxyz[0] = cos(angle);
-  out->quat_wxyz[1 + dice_below(h, 3)] = sin(angle);
+  out->quat_wxyz[1 + dice_below(&h->dice, 3)] = sin(angle);
 }
 
 static void hash_word(random_hands *h, uint64_t word)
@@ -80,7 +58,7 @@ void random_hands_begin(random_hands *h, uint64_t seed)
   memset(h, 0, sizeof *h);
   h->dice = (seed + 77) * 0x9e3779b97f4a7c15u;
   for (int i = 0; i < 8; ++i) {
-    (void)dice_next(h);
+    (void)dice_next(&h->dice);
   }
 }
 
@@ -100,15 +78,15 @@ static void force_make(random_hands *h, dBodyID body, hap_force_def *out)
 {
   static char wrong;
   hap_force_def_init(out, sizeof *out);
-  out->kind = 1 + dice_below(h, HAP_FORCE_CALL);
-  out->frame = dice_below(h, 3);
-  out->target = dice_below(h, 3);
+  out->kind = 1 + dice_below(&h->dice, HAP_FORCE_CALL);
+  out->frame = dice_below(&h->dice, 3);
+  out->target = dice_below(&h->dice, 3);
   out->body = out->frame == HAP_FORCE_BODY ? body : NULL;
-  dice_fill(h, 0.1, 3, out->origin);
-  dice_fill(h, 1.0, 3, out->axis);
-  dice_fill(h, 0.02, 3, out->point);
-  dice_fill(h, 3.0, 3, out->force);
-  dice_fill(h, 0.05, 3, out->torque);
+  dice_fill(&h->dice, -0.1, 0.1, 3, out->origin);
+  dice_fill(&h->dice, -1.0, 1.0, 3, out->axis);
+  dice_fill(&h->dice, -0.02, 0.02, 3, out->point);
+  dice_fill(&h->dice, -3.0, 3.0, 3, out->force);
+  dice_fill(&h->dice, -0.05, 0.05, 3, out->torque);
   out->stiffness = dice_number(h, 2000.0);
   out->damping = dice_number(h, 10.0);
   out->mass = dice_number(h, 1.0);
@@ -117,10 +95,10 @@ static void force_make(random_hands *h, dBodyID body, hap_force_def *out)
   out->pitch = dice_number(h, 0.02);
   out->vibration.hz = dice_number(h, 400.0);
   out->fade_in_s = dice_number(h, 0.1);
-  out->max_power = dice_below(h, 2) == 0 ? HAP_FORCE_POWER_AUTO : dice_number(h, 2.0);
+  out->max_power = dice_below(&h->dice, 2) == 0 ? HAP_FORCE_POWER_AUTO : dice_number(h, 2.0);
   if (out->kind == HAP_FORCE_CALL) {
     out->call = hand_push;
-    out->user = dice_below(h, 16) == 0 ? &wrong : NULL;
+    out->user = dice_below(&h->dice, 16) == 0 ? &wrong : NULL;
     out->max_force = dice_number(h, 5.0);
   }
 }
@@ -130,7 +108,7 @@ static void force_change(random_hands *h, hap_session *session, hap_pointer_id p
 {
   hap_force_def def;
   hap_force_state state;
-  uint32_t at = dice_below(h, RANDOM_FORCES);
+  uint32_t at = dice_below(&h->dice, RANDOM_FORCES);
   force_make(h, body, &def);
   if (h->forces[at].id.v == 0) {
     h->forces[at].pointer = pointer;
@@ -140,7 +118,7 @@ static void force_change(random_hands *h, hap_session *session, hap_pointer_id p
     return;
   }
   pointer = h->forces[at].pointer; /* may have left: then the force is not found */
-  switch (dice_below(h, 3)) {
+  switch (dice_below(&h->dice, 3)) {
     case 0:
       status_note(h, hap_pointer_force_set(session, pointer, h->forces[at].id, &def));
       break;
@@ -163,11 +141,11 @@ static void settings_change(random_hands *h, hap_session *session, hap_pointer_i
       {0.01, 0.0, 0.0}, {-0.01, 0.01, 0.0}, {-0.01, -0.01, 0.0}, {0.0, 0.0, 0.015}};
   hap_pointer_settings s;
   hap_pointer_settings_init(&s, sizeof s);
-  s.mask = 1u << dice_below(h, 13); /* one bit is unknown */
-  s.mask |= 1u << dice_below(h, 13);
+  s.mask = 1u << dice_below(&h->dice, 13); /* one bit is unknown */
+  s.mask |= 1u << dice_below(&h->dice, 13);
   pose_make(h, 0.1, &s.pose_world_device);
-  dice_fill(h, 0.3, 3, s.twist_world_device.linear);
-  dice_fill(h, 1.0, 3, s.twist_world_device.angular);
+  dice_fill(&h->dice, -0.3, 0.3, 3, s.twist_world_device.linear);
+  dice_fill(&h->dice, -1.0, 1.0, 3, s.twist_world_device.angular);
   s.motion_scale = dice_number(h, 3.0);
   s.force_scale = dice_number(h, 2.0);
   s.stiffness = dice_number(h, 3000.0);
@@ -176,10 +154,10 @@ static void settings_change(random_hands *h, hap_session *session, hap_pointer_i
   s.max_force = dice_number(h, 10.0);
   s.max_torque = dice_number(h, 1.0);
   s.radius = dice_number(h, 0.02);
-  s.hull_xyz = dice_below(h, 2) == 0 ? &wedge[0][0] : NULL;
+  s.hull_xyz = dice_below(&h->dice, 2) == 0 ? &wedge[0][0] : NULL;
   s.hull_points = s.hull_xyz != NULL ? 4 : 0;
-  s.collide_bits = dice_below(h, 4) == 0 ? 0u : ~0u;
-  s.coupling = (hap_coupling)dice_below(h, 6);
+  s.collide_bits = dice_below(&h->dice, 4) == 0 ? 0u : ~0u;
+  s.coupling = (hap_coupling)dice_below(&h->dice, 6);
   s.coupling_stiffness = dice_number(h, 1000.0);
   status_note(h, hap_pointer_set(session, pointer, &s));
 }
@@ -188,22 +166,23 @@ static void grab_change(random_hands *h, hap_session *session, hap_pointer_id po
 {
   hap_grab_def def;
   hap_grab_def_init(&def, sizeof def);
-  def.place = dice_below(h, 2);
-  def.turns = dice_below(h, 2);
+  def.place = dice_below(&h->dice, 2);
+  def.turns = dice_below(&h->dice, 2);
   pose_make(h, 0.05, &def.pose_body_pointer);
-  def.stiffness = dice_below(h, 2) == 0 ? 0.0 : dice_number(h, 5000.0);
-  def.damping = dice_below(h, 2) == 0 ? 0.0 : dice_number(h, 20.0);
-  def.max_force = dice_below(h, 2) == 0 ? 0.0 : dice_number(h, 20.0);
-  status_note(h, dice_below(h, 3) == 0 ? hap_pointer_release(session, pointer)
-                                       : hap_pointer_attach(session, pointer, body,
-                                                            dice_below(h, 4) == 0 ? NULL : &def));
+  def.stiffness = dice_below(&h->dice, 2) == 0 ? 0.0 : dice_number(h, 5000.0);
+  def.damping = dice_below(&h->dice, 2) == 0 ? 0.0 : dice_number(h, 20.0);
+  def.max_force = dice_below(&h->dice, 2) == 0 ? 0.0 : dice_number(h, 20.0);
+  status_note(h, dice_below(&h->dice, 3) == 0
+                     ? hap_pointer_release(session, pointer)
+                     : hap_pointer_attach(session, pointer, body,
+                                          dice_below(&h->dice, 4) == 0 ? NULL : &def));
 }
 
 static void outputs_change(random_hands *h, hap_session *session, hap_pointer_id pointer)
 {
   hap_pointer_outputs o;
   hap_pointer_outputs_init(&o, sizeof o);
-  o.leds = dice_below(h, 4);
+  o.leds = dice_below(&h->dice, 4);
   o.vibrators[0].amplitude = dice_number(h, 1.0);
   o.vibrators[0].frequency = dice_number(h, 300.0);
   for (int i = 0; i < 2; ++i) {
@@ -230,7 +209,7 @@ static void body_teleport(random_hands *h, hap_session *session, dBodyID body)
 void random_hands_change(random_hands *h, hap_session *session, hap_pointer_id pointer,
                          dBodyID body)
 {
-  switch (dice_below(h, 8)) {
+  switch (dice_below(&h->dice, 8)) {
     case 0:
     case 1:
       force_change(h, session, pointer, body);
@@ -239,7 +218,7 @@ void random_hands_change(random_hands *h, hap_session *session, hap_pointer_id p
       settings_change(h, session, pointer);
       break;
     case 3:
-      status_note(h, hap_pointer_clutch(session, pointer, dice_below(h, 2) == 0));
+      status_note(h, hap_pointer_clutch(session, pointer, dice_below(&h->dice, 2) == 0));
       break;
     case 4:
     case 5:

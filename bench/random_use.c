@@ -13,6 +13,7 @@
 #include <hapode/ode.h>
 #include <hapode/research.h>
 
+#include "bench/dice.h"
 #include "bench/random_hands.h"
 
 #define BODIES 20
@@ -58,38 +59,6 @@ typedef struct use {
   random_hands hands;
   uint64_t tick;
 } use;
-
-/* ---- dice ---- */
-
-static uint64_t dice_next(use *u)
-{
-  u->dice ^= u->dice << 13;
-  u->dice ^= u->dice >> 7;
-  u->dice ^= u->dice << 17;
-  return u->dice;
-}
-
-static double dice_between(use *u, double low, double high)
-{
-  return low + (high - low) * (double)(dice_next(u) >> 11) * 0x1p-53;
-}
-
-static int dice_below(use *u, int count)
-{
-  return (int)((dice_next(u) >> 33) % (uint64_t)count);
-}
-
-static bool dice_chance(use *u, double share)
-{
-  return dice_between(u, 0.0, 1.0) < share;
-}
-
-static void dice_fill(use *u, double low, double high, int count, double *out)
-{
-  for (int i = 0; i < count; ++i) {
-    out[i] = dice_between(u, low, high);
-  }
-}
 
 /* ---- what came of it ---- */
 
@@ -196,8 +165,8 @@ typedef enum geom_kind {
 static dGeomID geom_make(use *u, dSpaceID space, geom_kind kind)
 {
   double s[3];
-  dice_fill(u, 0.02, 0.06, 3, s);
-  int shape = dice_below(u, SHAPES);
+  dice_fill(&u->dice, 0.02, 0.06, 3, s);
+  int shape = (int)dice_below(&u->dice, SHAPES);
   switch (kind) {
     case GEOM_SPHERE:
       return dCreateSphere(space, s[0]);
@@ -227,23 +196,23 @@ static geom_kind geom_kind_any(use *u)
 {
   static const geom_kind kinds[] = {GEOM_SPHERE,   GEOM_BOX,    GEOM_BOX,  GEOM_CAPSULE,
                                     GEOM_CYLINDER, GEOM_CONVEX, GEOM_MESH, GEOM_RAY};
-  return kinds[dice_below(u, (int)(sizeof kinds / sizeof kinds[0]))];
+  return kinds[(int)dice_below(&u->dice, (uint32_t)(sizeof kinds / sizeof kinds[0]))];
 }
 
 static dSpaceID space_any(use *u)
 {
-  dSpaceID nested = u->nested[dice_below(u, NESTED)];
-  return nested != NULL && dice_chance(u, 0.4) ? nested : u->space;
+  dSpaceID nested = u->nested[(int)dice_below(&u->dice, NESTED)];
+  return nested != NULL && dice_chance(&u->dice, 0.4) ? nested : u->space;
 }
 
 static void geom_offset(use *u, dGeomID geom)
 {
   double at[3];
   dQuaternion q = {1.0, 0.0, 0.0, 0.0};
-  dice_fill(u, -0.05, 0.05, 3, at);
+  dice_fill(&u->dice, -0.05, 0.05, 3, at);
   dGeomSetOffsetPosition(geom, at[0], at[1], at[2]);
-  if (dice_chance(u, 0.5)) {
-    dice_fill(u, -1.0, 1.0, 3, q + 1);
+  if (dice_chance(&u->dice, 0.5)) {
+    dice_fill(&u->dice, -1.0, 1.0, 3, q + 1);
     dNormalize4(q);
     dGeomSetOffsetQuaternion(geom, q);
   }
@@ -263,8 +232,8 @@ static void geom_stir(dGeomID geom)
 static void geom_resize(use *u, dGeomID geom)
 {
   double s[3];
-  dice_fill(u, 0.02, 0.06, 3, s);
-  int shape = dice_below(u, SHAPES);
+  dice_fill(&u->dice, 0.02, 0.06, 3, s);
+  int shape = (int)dice_below(&u->dice, SHAPES);
   dSpaceID space = dGeomGetSpace(geom);
   switch (dGeomGetClass(geom)) {
     case dSphereClass:
@@ -306,10 +275,10 @@ static void geom_destroy(use *u, dGeomID geom)
 static void body_place(use *u, dBodyID body)
 {
   double at[3];
-  const use_pointer *near = &u->pointers[dice_below(u, POINTERS)];
-  dice_fill(u, -0.06, 0.06, 3, at);
-  if (dice_chance(u, 0.2)) {
-    dice_fill(u, -0.3, 0.3, 3, at);
+  const use_pointer *near = &u->pointers[(int)dice_below(&u->dice, POINTERS)];
+  dice_fill(&u->dice, -0.06, 0.06, 3, at);
+  if (dice_chance(&u->dice, 0.2)) {
+    dice_fill(&u->dice, -0.3, 0.3, 3, at);
   }
   for (int k = 0; k < 3; ++k) {
     at[k] += near->center[k];
@@ -320,7 +289,7 @@ static void body_place(use *u, dBodyID body)
 static void body_turn(use *u, dBodyID body)
 {
   dQuaternion q = {1.0, 0.0, 0.0, 0.0};
-  dice_fill(u, -1.0, 1.0, 4, q);
+  dice_fill(&u->dice, -1.0, 1.0, 4, q);
   q[0] += 2.5;
   dNormalize4(q);
   dBodySetQuaternion(body, q);
@@ -330,7 +299,7 @@ static void body_set_mass(use *u, dBodyID body)
 {
   dMass mass;
   double s[4];
-  dice_fill(u, 0.03, 0.1, 4, s);
+  dice_fill(&u->dice, 0.03, 0.1, 4, s);
   dMassSetBoxTotal(&mass, 20.0 * s[3] * s[3] * 2.0, s[0], s[1], s[2]);
   dBodySetMass(body, &mass);
 }
@@ -342,7 +311,7 @@ static void body_add_geom(use *u, use_body *b, geom_kind kind)
   }
   dGeomID geom = geom_make(u, space_any(u), kind);
   dGeomSetBody(geom, b->body);
-  if (b->geom_count > 0 || dice_chance(u, 0.1)) {
+  if (b->geom_count > 0 || dice_chance(&u->dice, 0.1)) {
     geom_offset(u, geom);
   }
   b->geoms[b->geom_count++] = geom;
@@ -351,7 +320,7 @@ static void body_add_geom(use *u, use_body *b, geom_kind kind)
 /* Out of the list; the geom stays. */
 static dGeomID body_take_geom(use *u, use_body *b)
 {
-  int i = dice_below(u, b->geom_count);
+  int i = (int)dice_below(&u->dice, b->geom_count);
   dGeomID geom = b->geoms[i];
   b->geoms[i] = b->geoms[--b->geom_count];
   return geom;
@@ -378,10 +347,10 @@ static void body_create(use *u, use_body *b)
   b->body = dBodyCreate(u->world);
   body_place(u, b->body);
   body_set_mass(u, b->body);
-  if (dice_chance(u, 0.3)) {
+  if (dice_chance(&u->dice, 0.3)) {
     body_turn(u, b->body);
   }
-  if (dice_chance(u, 0.95)) {
+  if (dice_chance(&u->dice, 0.95)) {
     body_add_geom(u, b, geom_kind_any(u));
   }
   body_settle(u, b->body);
@@ -393,7 +362,7 @@ static void body_destroy(use *u, use_body *b)
   if (status != HAP_ERROR_NOT_FOUND) {
     status_expect(u, status, "hap_session_forget_body");
   }
-  bool geoms_first = dice_chance(u, 0.5);
+  bool geoms_first = dice_chance(&u->dice, 0.5);
   while (geoms_first && b->geom_count > 0) {
     geom_destroy(u, body_take_geom(u, b));
   }
@@ -401,7 +370,7 @@ static void body_destroy(use *u, use_body *b)
     dJointID joint = u->joints[i];
     if (joint != NULL &&
         (dJointGetBody(joint, 0) == b->body || dJointGetBody(joint, 1) == b->body) &&
-        dice_chance(u, 0.6)) {
+        dice_chance(&u->dice, 0.6)) {
       dJointDestroy(joint);
       u->joints[i] = NULL;
     }
@@ -473,12 +442,12 @@ static void joint_place(use *u, dJointID joint)
   double p[3];
   dVector3 d = {0.0};
   dVector3 e;
-  dice_fill(u, -0.04, 0.04, 3, p);
-  dice_fill(u, -0.3, 0.3, 3, d);
+  dice_fill(&u->dice, -0.04, 0.04, 3, p);
+  dice_fill(&u->dice, -0.3, 0.3, 3, d);
   if (body == NULL) {
     return;
   }
-  int main_axis = dice_below(u, 3);
+  int main_axis = (int)dice_below(&u->dice, 3);
   d[main_axis] += 1.0;
   for (int k = 0; k < 3; ++k) {
     p[k] += dBodyGetPosition(body)[k];
@@ -558,8 +527,8 @@ static void joint_set_parameters(use *u, dJointID joint)
 {
   const joint_kind *kind = joint_kind_of(joint);
   double v[4];
-  dice_fill(u, 0.0, 1.0, 4, v);
-  int group = kind->groups > 0 ? dice_below(u, kind->groups) * dParamGroup : 0;
+  dice_fill(&u->dice, 0.0, 1.0, 4, v);
+  int group = kind->groups > 0 ? (int)dice_below(&u->dice, kind->groups) * dParamGroup : 0;
   if (kind->set == NULL) {
     return;
   }
@@ -568,7 +537,7 @@ static void joint_set_parameters(use *u, dJointID joint)
     kind->set(joint, dParamCFM, 1e-5 * v[1]);
     return;
   }
-  switch (dice_below(u, 4)) {
+  switch ((int)dice_below(&u->dice, 4)) {
     case 0:
       kind->set(joint, dParamLoStop + group, -0.6 * v[0]);
       kind->set(joint, dParamHiStop + group, 0.6 * v[1]);
@@ -595,7 +564,7 @@ static void joint_set_parameters(use *u, dJointID joint)
 
 static dBodyID body_any(use *u)
 {
-  return u->bodies[dice_below(u, BODIES)].body;
+  return u->bodies[(int)dice_below(&u->dice, BODIES)].body;
 }
 
 /* False: there are no such bodies now. */
@@ -607,9 +576,9 @@ static bool joint_attach(use *u, dJointID joint, const joint_kind *kind)
   if (a == NULL || a == b || (kind->two && b == NULL)) {
     return false;
   }
-  if (plane || (!kind->two && dice_chance(u, 0.2))) {
+  if (plane || (!kind->two && dice_chance(&u->dice, 0.2))) {
     b = NULL;
-  } else if (!kind->two && b != NULL && dice_chance(u, 0.1)) {
+  } else if (!kind->two && b != NULL && dice_chance(&u->dice, 0.1)) {
     a = NULL;
   }
   dJointAttach(joint, a, b);
@@ -634,7 +603,7 @@ static void joint_destroy(use *u, int index)
 
 static int joint_kind_any(use *u)
 {
-  return dice_below(u, dice_chance(u, 0.7) ? 6 : JOINT_KINDS);
+  return (int)dice_below(&u->dice, dice_chance(&u->dice, 0.7) ? 6 : JOINT_KINDS);
 }
 
 /* A joint made as another one is: the same kind, bodies and parameters that can be read. */
@@ -677,14 +646,14 @@ static void edit_body_replace(use *u, int at)
 static void edit_body_two(use *u, int at)
 {
   use_body *a = &u->bodies[at % BODIES];
-  use_body *b = &u->bodies[(at + 1 + dice_below(u, BODIES - 1)) % BODIES];
+  use_body *b = &u->bodies[(at + 1 + (int)dice_below(&u->dice, BODIES - 1)) % BODIES];
   if (a->body != NULL) {
     body_destroy(u, a);
   }
   if (b->body != NULL) {
     body_destroy(u, b);
   }
-  body_create(u, dice_chance(u, 0.5) ? a : b);
+  body_create(u, dice_chance(&u->dice, 0.5) ? a : b);
   body_create(u, a->body != NULL ? b : a);
 }
 
@@ -701,7 +670,7 @@ static void edit_body_velocity(use *u, int at)
 {
   dBodyID body = u->bodies[at % BODIES].body;
   double v[6];
-  dice_fill(u, -0.5, 0.5, 6, v);
+  dice_fill(&u->dice, -0.5, 0.5, 6, v);
   if (body != NULL) {
     dBodySetLinearVel(body, v[0], v[1], v[2]);
     dBodySetAngularVel(body, 4 * v[3], 4 * v[4], 4 * v[5]);
@@ -712,7 +681,7 @@ static void edit_body_force(use *u, int at)
 {
   dBodyID body = u->bodies[at % BODIES].body;
   double v[6];
-  dice_fill(u, -1.0, 1.0, 6, v);
+  dice_fill(&u->dice, -1.0, 1.0, 6, v);
   if (body != NULL) {
     dBodyAddForce(body, v[0], v[1], v[2]);
     dBodyAddTorque(body, 0.01 * v[3], 0.01 * v[4], 0.01 * v[5]);
@@ -746,7 +715,7 @@ static void edit_body_enabled(use *u, int at)
   if (body == NULL) {
     return;
   }
-  if (dice_chance(u, 0.6)) {
+  if (dice_chance(&u->dice, 0.6)) {
     dBodyEnable(body);
   } else {
     dBodyDisable(body);
@@ -757,13 +726,13 @@ static void edit_body_settings(use *u, int at)
 {
   dBodyID body = u->bodies[at % BODIES].body;
   double v[4];
-  dice_fill(u, 0.0, 1.0, 4, v);
+  dice_fill(&u->dice, 0.0, 1.0, 4, v);
   if (body == NULL) {
     return;
   }
-  switch (dice_below(u, 6)) {
+  switch ((int)dice_below(&u->dice, 6)) {
     case 0:
-      dBodySetAutoDisableFlag(body, dice_chance(u, 0.6));
+      dBodySetAutoDisableFlag(body, dice_chance(&u->dice, 0.6));
       break;
     case 1:
       dBodySetAutoDisableTime(body, 0.3 * v[0]);
@@ -776,12 +745,12 @@ static void edit_body_settings(use *u, int at)
       dBodySetDamping(body, 0.05 * v[1], 0.05 * v[2]);
       break;
     case 3:
-      dBodySetFiniteRotationMode(body, dice_chance(u, 0.5));
+      dBodySetFiniteRotationMode(body, dice_chance(&u->dice, 0.5));
       dBodySetFiniteRotationAxis(body, v[0], v[1], v[2]);
       break;
     case 4:
-      dBodySetGravityMode(body, dice_chance(u, 0.7));
-      dBodySetGyroscopicMode(body, dice_chance(u, 0.5));
+      dBodySetGravityMode(body, dice_chance(&u->dice, 0.7));
+      dBodySetGyroscopicMode(body, dice_chance(&u->dice, 0.5));
       break;
     default:
       dBodySetAutoDisableDefaults(body);
@@ -800,7 +769,7 @@ static void edit_body_known(use *u, int at)
   if (body == NULL) {
     return;
   }
-  switch (dice_below(u, 3)) {
+  switch ((int)dice_below(&u->dice, 3)) {
     case 0:
       EXPECT(u, hap_session_adopt_body(u->session, body));
       break;
@@ -810,7 +779,7 @@ static void edit_body_known(use *u, int at)
     default:
       EXPECT(u, hap_session_adopt_body(u->session, body));
       EXPECT(u, hap_session_set_moved_callback(u->session, body,
-                                               dice_chance(u, 0.5) ? body_has_moved : NULL));
+                                               dice_chance(&u->dice, 0.5) ? body_has_moved : NULL));
       break;
   }
 }
@@ -821,7 +790,7 @@ static void edit_geom_life(use *u, int at)
   if (b->body == NULL) {
     return;
   }
-  if (b->geom_count == 0 || dice_chance(u, 0.5)) {
+  if (b->geom_count == 0 || dice_chance(&u->dice, 0.5)) {
     body_add_geom(u, b, geom_kind_any(u));
   } else {
     geom_destroy(u, body_take_geom(u, b));
@@ -841,15 +810,15 @@ static void edit_geom_replace(use *u, int at)
                                     [dCapsuleClass] = GEOM_CAPSULE,
                                     [dCylinderClass] = GEOM_CYLINDER};
   geom_destroy(u, geom);
-  body_add_geom(u, b,
-                kind <= dCylinderClass && dice_chance(u, 0.7) ? kinds[kind] : geom_kind_any(u));
+  body_add_geom(
+      u, b, kind <= dCylinderClass && dice_chance(&u->dice, 0.7) ? kinds[kind] : geom_kind_any(u));
 }
 
 /* Geoms of two bodies go and come in another order. */
 static void edit_geom_two(use *u, int at)
 {
   use_body *a = &u->bodies[at % BODIES];
-  use_body *b = &u->bodies[(at + 1 + dice_below(u, BODIES - 1)) % BODIES];
+  use_body *b = &u->bodies[(at + 1 + (int)dice_below(&u->dice, BODIES - 1)) % BODIES];
   if (a->geom_count == 0 || b->geom_count == 0) {
     return;
   }
@@ -857,7 +826,7 @@ static void edit_geom_two(use *u, int at)
   geom_destroy(u, body_take_geom(u, b));
   geom_kind kind = geom_kind_any(u);
   body_add_geom(u, a, kind);
-  body_add_geom(u, b, dice_chance(u, 0.7) ? kind : geom_kind_any(u));
+  body_add_geom(u, b, dice_chance(&u->dice, 0.7) ? kind : geom_kind_any(u));
 }
 
 /* By one of the same sizes, to the last bit. */
@@ -888,7 +857,7 @@ static void edit_geom_shape(use *u, int at)
 {
   use_body *b = &u->bodies[at % BODIES];
   if (b->geom_count > 0) {
-    geom_resize(u, b->geoms[dice_below(u, b->geom_count)]);
+    geom_resize(u, b->geoms[(int)dice_below(&u->dice, b->geom_count)]);
   }
 }
 
@@ -898,8 +867,8 @@ static void edit_geom_offset(use *u, int at)
   if (b->geom_count == 0) {
     return;
   }
-  dGeomID geom = b->geoms[dice_below(u, b->geom_count)];
-  if (dice_chance(u, 0.6)) {
+  dGeomID geom = b->geoms[(int)dice_below(&u->dice, b->geom_count)];
+  if (dice_chance(&u->dice, 0.6)) {
     geom_offset(u, geom);
   } else {
     dGeomClearOffset(geom);
@@ -912,10 +881,10 @@ static void edit_geom_flags(use *u, int at)
   if (b->geom_count == 0) {
     return;
   }
-  dGeomID geom = b->geoms[dice_below(u, b->geom_count)];
-  dGeomSetCategoryBits(geom, dice_chance(u, 0.8) ? ~0ul : 2ul);
-  dGeomSetCollideBits(geom, dice_chance(u, 0.8) ? ~0ul : 2ul);
-  if (dice_chance(u, 0.8)) {
+  dGeomID geom = b->geoms[(int)dice_below(&u->dice, b->geom_count)];
+  dGeomSetCategoryBits(geom, dice_chance(&u->dice, 0.8) ? ~0ul : 2ul);
+  dGeomSetCollideBits(geom, dice_chance(&u->dice, 0.8) ? ~0ul : 2ul);
+  if (dice_chance(&u->dice, 0.8)) {
     dGeomEnable(geom);
   } else {
     dGeomDisable(geom);
@@ -928,7 +897,7 @@ static void edit_geom_space(use *u, int at)
   if (b->geom_count == 0) {
     return;
   }
-  dGeomID geom = b->geoms[dice_below(u, b->geom_count)];
+  dGeomID geom = b->geoms[(int)dice_below(&u->dice, b->geom_count)];
   dSpaceRemove(dGeomGetSpace(geom), geom);
   dSpaceAdd(space_any(u), geom);
   geom_stir(geom);
@@ -937,7 +906,7 @@ static void edit_geom_space(use *u, int at)
 static void edit_geom_give(use *u, int at)
 {
   use_body *from = &u->bodies[at % BODIES];
-  use_body *to = &u->bodies[(at + 1 + dice_below(u, BODIES - 1)) % BODIES];
+  use_body *to = &u->bodies[(at + 1 + (int)dice_below(&u->dice, BODIES - 1)) % BODIES];
   if (from->geom_count == 0 || to->body == NULL || to->geom_count == GEOMS) {
     return;
   }
@@ -952,10 +921,10 @@ static void edit_geom_give(use *u, int at)
 static void static_place(use *u, dGeomID geom)
 {
   double at[3];
-  const use_pointer *near = &u->pointers[dice_below(u, POINTERS)];
+  const use_pointer *near = &u->pointers[(int)dice_below(&u->dice, POINTERS)];
   dQuaternion q = {1.0, 0.0, 0.0, 0.0};
-  dice_fill(u, -0.08, 0.08, 3, at);
-  dice_fill(u, -0.3, 0.3, 3, q + 1);
+  dice_fill(&u->dice, -0.08, 0.08, 3, at);
+  dice_fill(&u->dice, -0.3, 0.3, 3, q + 1);
   dNormalize4(q);
   if (dGeomGetClass(geom) == dPlaneClass) {
     dGeomPlaneSetParams(geom, 0.0, 0.0, 1.0, -0.1 + 0.2 * at[0]);
@@ -975,15 +944,15 @@ static void static_place(use *u, dGeomID geom)
 static void edit_static(use *u, int at)
 {
   dGeomID *geom = &u->statics[at % STATICS];
-  if (*geom == NULL || dice_chance(u, 0.6)) {
+  if (*geom == NULL || dice_chance(&u->dice, 0.6)) {
     if (*geom != NULL) {
       geom_destroy(u, *geom);
     }
-    *geom = geom_make(u, space_any(u), (geom_kind)dice_below(u, GEOM_KINDS));
+    *geom = geom_make(u, space_any(u), (geom_kind)(int)dice_below(&u->dice, GEOM_KINDS));
     static_place(u, *geom);
-  } else if (dice_chance(u, 0.5)) {
+  } else if (dice_chance(&u->dice, 0.5)) {
     geom_resize(u, *geom);
-  } else if (dice_chance(u, 0.5)) {
+  } else if (dice_chance(&u->dice, 0.5)) {
     geom_destroy(u, *geom);
     *geom = NULL;
   } else {
@@ -995,8 +964,8 @@ static void edit_static(use *u, int at)
 static void edit_static_two(use *u, int at)
 {
   dGeomID *a = &u->statics[at % STATICS];
-  dGeomID *b = &u->statics[(at + 1 + dice_below(u, STATICS - 1)) % STATICS];
-  geom_kind kind = (geom_kind)dice_below(u, GEOM_KINDS);
+  dGeomID *b = &u->statics[(at + 1 + (int)dice_below(&u->dice, STATICS - 1)) % STATICS];
+  geom_kind kind = (geom_kind)(int)dice_below(&u->dice, GEOM_KINDS);
   if (*a != NULL) {
     geom_destroy(u, *a);
   }
@@ -1019,7 +988,7 @@ static void edit_space(use *u, int at)
 {
   int index = at % NESTED;
   if (u->nested[index] == NULL) {
-    switch (dice_below(u, 3)) {
+    switch ((int)dice_below(&u->dice, 3)) {
       case 0:
         u->nested[index] = dSimpleSpaceCreate(u->space);
         break;
@@ -1073,7 +1042,7 @@ static void edit_joint_replace(use *u, int at)
   dBodyID a = dJointGetBody(u->joints[index], 0);
   dBodyID b = dJointGetBody(u->joints[index], 1);
   joint_destroy(u, index);
-  if (dice_chance(u, 0.5)) {
+  if (dice_chance(&u->dice, 0.5)) {
     joint_create_like(u, index, a, b, kind);
   } else {
     joint_create(u, index, joint_kind_any(u));
@@ -1083,7 +1052,7 @@ static void edit_joint_replace(use *u, int at)
 /* Two go and come: of the same kind between the same bodies, or the one in the other's place. */
 static void edit_joint_two(use *u, int at)
 {
-  int index[2] = {at % JOINTS, (at + 1 + dice_below(u, JOINTS - 1)) % JOINTS};
+  int index[2] = {at % JOINTS, (at + 1 + (int)dice_below(&u->dice, JOINTS - 1)) % JOINTS};
   const joint_kind *kinds[2];
   dBodyID bodies[2][2];
   for (int i = 0; i < 2; ++i) {
@@ -1094,10 +1063,10 @@ static void edit_joint_two(use *u, int at)
     bodies[i][0] = dJointGetBody(u->joints[index[i]], 0);
     bodies[i][1] = dJointGetBody(u->joints[index[i]], 1);
   }
-  int first = dice_below(u, 2);
+  int first = (int)dice_below(&u->dice, 2);
   joint_destroy(u, index[first]);
   joint_destroy(u, index[1 - first]);
-  first = dice_below(u, 2);
+  first = (int)dice_below(&u->dice, 2);
   for (int i = 0; i < 2; ++i) {
     int k = (first + i) % 2;
     joint_create_like(u, index[k], bodies[k][0], bodies[k][1], kinds[k]);
@@ -1108,7 +1077,7 @@ static void edit_joint_two(use *u, int at)
 static void edit_joint_twin(use *u, int at)
 {
   dJointID joint = u->joints[at % JOINTS];
-  int other = (at + 1 + dice_below(u, JOINTS - 1)) % JOINTS;
+  int other = (at + 1 + (int)dice_below(&u->dice, JOINTS - 1)) % JOINTS;
   if (joint == NULL || u->joints[other] != NULL || dJointGetType(joint) == dJointTypePlane2D) {
     return;
   }
@@ -1130,11 +1099,11 @@ static void edit_joint_set(use *u, int at)
   if (joint == NULL) {
     return;
   }
-  if (dice_chance(u, 0.3)) {
+  if (dice_chance(&u->dice, 0.3)) {
     joint_place(u, joint);
   }
   joint_set_parameters(u, joint);
-  if (dice_chance(u, 0.2)) {
+  if (dice_chance(&u->dice, 0.2)) {
     dJointDisable(joint);
   } else {
     dJointEnable(joint);
@@ -1145,8 +1114,8 @@ static void edit_world(use *u, int at)
 {
   double v[4];
   (void)at;
-  dice_fill(u, 0.0, 1.0, 4, v);
-  switch (dice_below(u, 4)) {
+  dice_fill(&u->dice, 0.0, 1.0, 4, v);
+  switch ((int)dice_below(&u->dice, 4)) {
     case 0:
       dWorldSetGravity(u->world, 2 * v[0] - 1, 2 * v[1] - 1, -9.81 * v[2]);
       break;
@@ -1228,8 +1197,8 @@ static void bodies_calm(use *u)
 static void edits_run(use *u, int count)
 {
   for (int i = 0; i < count; ++i) {
-    const edit *e = &edits[dice_below(u, (int)(sizeof edits / sizeof edits[0]))];
-    int at = dice_below(u, 1 << 20);
+    const edit *e = &edits[(int)dice_below(&u->dice, (uint32_t)(sizeof edits / sizeof edits[0]))];
+    int at = (int)dice_below(&u->dice, 1 << 20);
     use_say(u, "%s %d", e->name, at);
     e->run(u, at);
     bodies_settle(u);
@@ -1268,14 +1237,15 @@ static void use_pointer_surface(void *user, hap_pointer_id pointer, dGeomID geom
   io->friction_dynamic = 0.2 * kind;
   io->friction_static = 0.25 * kind;
   io->stiffness *= 1.0 + 0.5 * kind;
+  io->adhesion = kind == 3 ? 2.0 : 0.0;
 }
 
 static void use_before_step(void *user, double step_s)
 {
   use *u = user;
   (void)step_s;
-  if (dice_chance(u, 0.3)) {
-    edits_run(u, 1 + dice_below(u, 2));
+  if (dice_chance(&u->dice, 0.3)) {
+    edits_run(u, 1 + (int)dice_below(&u->dice, 2));
   }
 }
 
@@ -1283,8 +1253,8 @@ static void use_after_step(void *user, double step_s)
 {
   use *u = user;
   (void)step_s;
-  if (dice_chance(u, 0.3)) {
-    edits_run(u, 1 + dice_below(u, 2));
+  if (dice_chance(&u->dice, 0.3)) {
+    edits_run(u, 1 + (int)dice_below(&u->dice, 2));
   }
 }
 
@@ -1292,7 +1262,7 @@ static void use_posted(void *arg)
 {
   use *u = arg;
   --u->posted;
-  edits_run(u, 1 + dice_below(u, 2));
+  edits_run(u, 1 + (int)dice_below(&u->dice, 2));
 }
 
 /* ---- pointers ---- */
@@ -1307,7 +1277,7 @@ static void pointer_add(use *u, int index)
   hap_pointer_def_init(&def, sizeof def);
   hap_pointer_expert_def_init(&expert, sizeof expert);
   def.expert = &expert;
-  dice_fill(u, 0.0, 1.0, 6, v);
+  dice_fill(&u->dice, 0.0, 1.0, 6, v);
   def.device = p->device;
   def.radius = 0.006 + 0.01 * v[0];
   def.stiffness = 300.0 + 2000.0 * v[1];
@@ -1327,7 +1297,7 @@ static void pointer_add(use *u, int index)
   static const hap_coupling couplings[] = {
       HAP_COUPLING_AUTO,  HAP_COUPLING_AUTO,       HAP_COUPLING_DIRECT, HAP_COUPLING_DIRECT,
       HAP_COUPLING_PROXY, HAP_COUPLING_GOD_OBJECT, HAP_COUPLING_VIRTUAL};
-  expert.coupling = couplings[dice_below(u, 7)];
+  expert.coupling = couplings[(int)dice_below(&u->dice, 7)];
   if (expert.coupling > HAP_COUPLING_DIRECT) {
     expert.coupling_stiffness = 800.0;
     expert.coupling_damping = 1.0;
@@ -1354,8 +1324,8 @@ static hap_status pointer_open(use *u, int index, hap_detail *detail)
   snprintf(spec, sizeof spec,
            "virtual:path=0:%g/%g/%g;0.3:%g/%g/%g;0.6:%g/%g/%g,loop=1,dof=%d,hand=%s", p->center[0],
            p->center[1], p->center[2], p->center[0] + 0.04, p->center[1], p->center[2] - 0.03,
-           p->center[0], p->center[1], p->center[2], dice_chance(u, 0.5) ? 6 : 3,
-           dice_chance(u, 0.5) ? "rigid" : "relaxed");
+           p->center[0], p->center[1], p->center[2], dice_chance(&u->dice, 0.5) ? 6 : 3,
+           dice_chance(&u->dice, 0.5) ? "rigid" : "relaxed");
   return hap_device_open(spec, &p->device, detail);
 }
 
@@ -1375,10 +1345,10 @@ static void pointers_move(use *u)
 
 static void pointer_change(use *u)
 {
-  use_pointer *p = &u->pointers[dice_below(u, POINTERS)];
+  use_pointer *p = &u->pointers[(int)dice_below(&u->dice, POINTERS)];
   if (p->id.v == 0) {
     pointer_add(u, (int)(p - u->pointers));
-  } else if (p->device != NULL && u->started && dice_chance(u, 0.2)) {
+  } else if (p->device != NULL && u->started && dice_chance(&u->dice, 0.2)) {
     EXPECT(u, hap_pointer_restart(u->session, p->id));
   } else {
     EXPECT(u, hap_pointer_remove(u->session, p->id));
@@ -1404,19 +1374,21 @@ static hap_status session_create(use *u, hap_detail *detail)
   def.expert = &expert;
   def.research = &research;
   def.drive = HAP_DRIVE_LOCKSTEP;
-  def.model = models[dice_below(u, 6)];
-  def.physics_hz = rates[dice_below(u, 5)];
+  def.model = models[(int)dice_below(&u->dice, 6)];
+  def.physics_hz = rates[(int)dice_below(&u->dice, 5)];
   def.max_pointers = POINTERS;
-  def.max_bodies = dice_chance(u, 0.2) ? 3 : def.max_bodies;
-  expert.range_hops = dice_chance(u, 0.2) ? dice_below(u, 3) : expert.range_hops;
-  expert.lookback = dice_chance(u, 0.25) ? 0.2 : 0.0;
-  def.accuracy = dice_chance(u, 0.3) ? dice_between(u, 0.0, 1.0) : def.accuracy;
-  research.probe = dice_chance(u, 0.3) ? (hap_probe)dice_below(u, 3) : research.probe;
-  research.guard = dice_chance(u, 0.3) ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
+  def.max_bodies = dice_chance(&u->dice, 0.2) ? 3 : def.max_bodies;
+  expert.range_hops = dice_chance(&u->dice, 0.2) ? (int)dice_below(&u->dice, 3) : expert.range_hops;
+  expert.lookback = dice_chance(&u->dice, 0.25) ? 0.2 : 0.0;
+  def.accuracy = dice_chance(&u->dice, 0.3) ? dice_between(&u->dice, 0.0, 1.0) : def.accuracy;
+  research.probe =
+      dice_chance(&u->dice, 0.3) ? (hap_probe)(int)dice_below(&u->dice, 3) : research.probe;
+  research.guard = dice_chance(&u->dice, 0.3) ? HAP_GUARD_MEASURE : HAP_GUARD_ON;
   def.rt_priority = 0;
   for (int i = 0; i < HAP_EFFECTS; ++i) {
-    hap_effect_wish wish =
-        dice_chance(u, 0.15) ? (hap_effect_wish)dice_below(u, 3) : HAP_EFFECT_AUTO;
+    hap_effect_wish wish = dice_chance(&u->dice, 0.15)
+                               ? (hap_effect_wish)(int)dice_below(&u->dice, 3)
+                               : HAP_EFFECT_AUTO;
     bool can = hap_effect_check((hap_effect)i, wish, def.model, NULL) == HAP_OK &&
                i != HAP_EFFECT_RECORDING && i != HAP_EFFECT_OBSERVER;
     if (can && wish != HAP_EFFECT_AUTO) {
@@ -1426,7 +1398,7 @@ static hap_status session_create(use *u, hap_detail *detail)
   ode.world = u->world;
   ode.space = u->space;
   ode.surface = use_surface;
-  ode.pointer_surface = dice_chance(u, 0.3) ? use_pointer_surface : NULL;
+  ode.pointer_surface = dice_chance(&u->dice, 0.3) ? use_pointer_surface : NULL;
   ode.before_step = use_before_step;
   ode.after_step = use_after_step;
   ode.user = u;
@@ -1435,12 +1407,12 @@ static hap_status session_create(use *u, hap_detail *detail)
 
 static void session_change(use *u)
 {
-  hap_effect effect = (hap_effect)dice_below(u, HAP_EFFECTS);
-  hap_effect_wish wish = (hap_effect_wish)dice_below(u, 3);
-  double accuracy = dice_between(u, 0.0, 1.0);
-  switch (dice_below(u, 4)) {
+  hap_effect effect = (hap_effect)(int)dice_below(&u->dice, HAP_EFFECTS);
+  hap_effect_wish wish = (hap_effect_wish)(int)dice_below(&u->dice, 3);
+  double accuracy = dice_between(&u->dice, 0.0, 1.0);
+  switch ((int)dice_below(&u->dice, 4)) {
     case 0:
-      EXPECT(u, hap_session_set_model(u->session, (hap_model)dice_below(u, 4)));
+      EXPECT(u, hap_session_set_model(u->session, (hap_model)(int)dice_below(&u->dice, 4)));
       break;
     case 1:
       EXPECT(u, hap_session_set_accuracy(u->session, accuracy));
@@ -1483,9 +1455,9 @@ static void session_restart(use *u)
   u->started = false;
   session_note(u);
   EXPECT(u, hap_session_lock(u->session));
-  edits_run(u, dice_below(u, 6));
+  edits_run(u, (int)dice_below(&u->dice, 6));
   EXPECT(u, hap_session_unlock(u->session));
-  if (dice_chance(u, 0.5)) {
+  if (dice_chance(&u->dice, 0.5)) {
     pointer_change(u);
   }
   EXPECT(u, hap_session_start(u->session));
@@ -1529,22 +1501,22 @@ static void hands_change(use *u)
 
 static void use_advance(use *u)
 {
-  uint64_t ticks = 1 + (uint64_t)dice_below(u, 12);
+  uint64_t ticks = 1 + (uint64_t)(int)dice_below(&u->dice, 12);
   pointers_move(u);
-  if (dice_chance(u, 0.4)) {
-    edits_run(u, 1 + dice_below(u, 3));
+  if (dice_chance(&u->dice, 0.4)) {
+    edits_run(u, 1 + (int)dice_below(&u->dice, 3));
   }
-  if (dice_chance(u, 0.1)) {
+  if (dice_chance(&u->dice, 0.1)) {
     pointer_change(u);
   }
-  if (dice_chance(u, 0.03)) {
+  if (dice_chance(&u->dice, 0.03)) {
     session_change(u);
   }
-  if (dice_chance(u, 0.1) && u->posted < 20) {
+  if (dice_chance(&u->dice, 0.1) && u->posted < 20) {
     ++u->posted;
     EXPECT(u, hap_session_post(u->session, use_posted, u));
   }
-  if (dice_chance(u, 0.01)) {
+  if (dice_chance(&u->dice, 0.01)) {
     session_restart(u);
   }
   hands_change(u);
@@ -1566,16 +1538,16 @@ static void world_open(use *u)
   dGeomHeightfieldDataBuildCallback(u->field, u, field_height, 0.8, 0.8, 8, 8, 1.0, 0.0, 0.1, 0);
   dGeomHeightfieldDataSetBounds(u->field, -0.1, 0.1);
   u->world = dWorldCreate();
-  u->space = dice_chance(u, 0.7)   ? dHashSpaceCreate(NULL)
-             : dice_chance(u, 0.5) ? dSimpleSpaceCreate(NULL)
-                                   : dSweepAndPruneSpaceCreate(NULL, dSAP_AXES_XYZ);
+  u->space = dice_chance(&u->dice, 0.7)   ? dHashSpaceCreate(NULL)
+             : dice_chance(&u->dice, 0.5) ? dSimpleSpaceCreate(NULL)
+                                          : dSweepAndPruneSpaceCreate(NULL, dSAP_AXES_XYZ);
   u->nested[0] = dSimpleSpaceCreate(u->space);
-  dWorldSetGravity(u->world, 0.0, 0.0, dice_chance(u, 0.5) ? -9.81 : 0.0);
+  dWorldSetGravity(u->world, 0.0, 0.0, dice_chance(&u->dice, 0.5) ? -9.81 : 0.0);
   dWorldSetCFM(u->world, 1e-6);
   dWorldSetMaxAngularSpeed(u->world, 30.0);
   dWorldSetContactMaxCorrectingVel(u->world, 1.0);
   dWorldSetQuickStepNumIterations(u->world, 10);
-  dWorldSetAutoDisableFlag(u->world, dice_chance(u, 0.3));
+  dWorldSetAutoDisableFlag(u->world, dice_chance(&u->dice, 0.3));
   u->statics[0] = geom_make(u, u->space, GEOM_PLANE);
 }
 
@@ -1604,7 +1576,7 @@ hap_status random_use_run(const random_use_def *def, random_use_result *out, hap
   u->out = out;
   u->dice = (def->seed + 1) * 0x9e3779b97f4a7c15u;
   for (int i = 0; i < 8; ++i) {
-    (void)dice_next(u);
+    (void)dice_next(&u->dice);
   }
   random_hands_begin(&u->hands, def->seed);
   hap_status status = HAP_OK;

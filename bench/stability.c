@@ -4,9 +4,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "bench/points.h"
 #include "bench/stability.h"
+#include "bench/stability_own.h"
 
 #define STABILITY_ROWS_MAX 8192
 
@@ -26,95 +27,25 @@ typedef struct stability_table {
   double spoken;  /* s, of the newest line about how far it is */
 } stability_table;
 
-/* --only KEY=VALUE[/VALUE],...: points that have one of the values at each of the keys. */
-
-#define KEYS                                                                              \
-  "integrator, stiffness, mass, contacts, coupling, layout, hand, delay_ticks, quantum, " \
-  "missed, body"
-
-/* What a point has at a key: a word or, word NULL, a number. */
-typedef struct field {
-  const char *word;
-  double number;
-} field;
-
-static bool field_find(const stability_row *row, const char *key, size_t length, field *out)
-{
-  const stability_point *p = &row->point;
-  const struct {
-    const char *key;
-    field field;
-  } fields[] = {
-      {"integrator", {row->integrator, 0.0}},
-      {"coupling", {hap_coupling_name(p->coupling), 0.0}},
-      {"layout", {stability_layout_word(p->layout), 0.0}},
-      {"hand", {stability_hand_word(p->hand), 0.0}},
-      {"body", {p->cubes ? "cube" : "ball", 0.0}},
-      {"stiffness", {NULL, p->stiffness}},
-      {"mass", {NULL, p->mass}},
-      {"contacts", {NULL, p->contacts}},
-      {"delay_ticks", {NULL, p->delay_ticks}},
-      {"quantum", {NULL, p->quantum}},
-      {"missed", {NULL, p->missed}},
-  };
-  for (size_t i = 0; i < BENCH_COUNT(fields); ++i) {
-    if (strlen(fields[i].key) == length && strncmp(fields[i].key, key, length) == 0) {
-      *out = fields[i].field;
-      return true;
-    }
-  }
-  return false;
-}
-
-/* *out_has: the value, up to `length`, is the field's. False: not a value of such a field. */
-static bool field_compare(const field *f, const char *value, size_t length, bool *out_has)
-{
-  if (f->word != NULL) {
-    *out_has = strlen(f->word) == length && strncmp(f->word, value, length) == 0;
-    return length > 0;
-  }
-  char *end = NULL;
-  *out_has = strtod(value, &end) == f->number;
-  return length > 0 && end == value + length;
-}
-
-/* One "KEY=VALUE/VALUE" of this length. */
-static bool look_at(const char *item, size_t length, const stability_row *row, bool *io_takes)
-{
-  size_t key = strcspn(item, "=,");
-  field f = {NULL, 0.0};
-  bool any = false;
-  if (key >= length || !field_find(row, item, key, &f)) {
-    return false;
-  }
-  for (size_t at = key; at < length;) {
-    const char *value = item + at + 1;
-    size_t size = strcspn(value, "/,");
-    bool has = false;
-    if (!field_compare(&f, value, size, &has)) {
-      return false;
-    }
-    any = any || has;
-    at += 1 + size;
-  }
-  *io_takes = *io_takes && any;
-  return true;
-}
-
 /* Whether --only takes the point. */
 static hap_status stability_filter(bench *b, const stability_row *row, bool *out_takes)
 {
-  *out_takes = true;
-  for (const char *item = b->only; item != NULL && *item != '\0';) {
-    size_t length = strcspn(item, ",");
-    if (!look_at(item, length, row, out_takes)) {
-      return bench_fail(b, HAP_ERROR_ARGUMENT,
-                        "--only: \"%.*s\" is not KEY=VALUE or KEY=VALUE/VALUE; keys are " KEYS,
-                        (int)length, item);
-    }
-    item += length + (item[length] == ',');
-  }
-  return HAP_OK;
+  const stability_point *p = &row->point;
+  const point_field fields[] = {
+      {"map", "contacts", 0.0},
+      {"integrator", row->integrator, 0.0},
+      {"coupling", hap_coupling_name(p->coupling), 0.0},
+      {"layout", stability_layout_word(p->layout), 0.0},
+      {"hand", stability_hand_word(p->hand), 0.0},
+      {"body", p->cubes ? "cube" : "ball", 0.0},
+      {"stiffness", NULL, p->stiffness},
+      {"mass", NULL, p->mass},
+      {"contacts", NULL, p->contacts},
+      {"delay_ticks", NULL, p->delay_ticks},
+      {"quantum", NULL, p->quantum},
+      {"missed", NULL, p->missed},
+  };
+  return points_filter(b, fields, BENCH_COUNT(fields), STABILITY_KEYS, out_takes);
 }
 
 #define PANEL_WIDTH 300
@@ -206,7 +137,6 @@ static void stability_draw(FILE *script, const void *data)
  * encoder, missed ticks and other hands. What a point is, and when it is stable: stability.h. */
 
 #define SECONDS 5.0
-#define SPEAK_S 60.0    /* between two lines about how far it is */
 #define MIDDLE_MASS 0.1 /* kg, of the map over contacts */
 #define MIDDLE_CONTACTS 8
 #define QUANTUM 3e-5     /* m, an encoder */
@@ -258,19 +188,6 @@ static hap_status row_feel(bench *b, const stability_table *table, stability_row
   return stability_feel(b, &row->point, &row->felt);
 }
 
-static void say_how_far(stability_table *table)
-{
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  double seconds = (double)now.tv_sec;
-  if (table->spoken == 0.0) {
-    table->spoken = seconds;
-  } else if (seconds - table->spoken >= SPEAK_S) {
-    fprintf(stderr, "stability: %zu of %zu points\n", table->count, table->planned);
-    table->spoken = seconds;
-  }
-}
-
 static hap_status add_point(bench *b, stability_table *table, const char *name,
                             const stability_point *point)
 {
@@ -284,7 +201,7 @@ static hap_status add_point(bench *b, stability_table *table, const char *name,
     table->planned += takes && table->planning;
     return status;
   }
-  say_how_far(table);
+  points_say_how_far(table->count, table->planned, &table->spoken);
   status = stability_run(b, point, SECONDS, &row.result);
   if (status >= HAP_OK && point->coupling != HAP_COUPLING_DIRECT) {
     status = row_feel(b, table, &row);
@@ -505,20 +422,10 @@ static hap_status points_measure(bench *b, stability_table *table)
   return status;
 }
 
-hap_status bench_stability(bench *b)
+/* The map of stiffness, mass and contacts. */
+static hap_status contacts_measure(bench *b, stability_table *table)
 {
-  stability_table *table = calloc(1, sizeof *table);
-  if (table == NULL) {
-    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the table");
-  }
-  table->planning = true;
   hap_status status = points_measure(b, table);
-  table->planning = false;
-  if (status >= HAP_OK && table->planned == 0) {
-    status = bench_fail(b, HAP_ERROR_NOT_FOUND, "--only %s: there is no such point",
-                        b->only != NULL ? b->only : "");
-  }
-  status = status >= HAP_OK ? points_measure(b, table) : status;
   status = status >= HAP_OK ? table_write(b, table) : status;
   if (status >= HAP_OK) {
     say_counts(table);
@@ -529,6 +436,27 @@ hap_status bench_stability(bench *b)
                           table);
     }
   }
-  free(table);
   return status;
+}
+
+hap_status bench_stability(bench *b)
+{
+  size_t own = 0;
+  stability_table *table = calloc(1, sizeof *table);
+  if (table == NULL) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the table");
+  }
+  table->planning = true;
+  hap_status status = points_measure(b, table);
+  table->planning = false;
+  status = status >= HAP_OK ? own_points_count(b, &own) : status;
+  if (status >= HAP_OK && table->planned + own == 0) {
+    status = bench_fail(b, HAP_ERROR_NOT_FOUND, "--only %s: there is no such point",
+                        b->only != NULL ? b->only : "");
+  }
+  if (status >= HAP_OK && table->planned > 0) {
+    status = contacts_measure(b, table);
+  }
+  free(table);
+  return status >= HAP_OK && own > 0 ? own_points_measure(b, own) : status;
 }

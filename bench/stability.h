@@ -24,6 +24,13 @@
 
 #include <hapode/hapode.h>
 
+#include "plugins/virtual/virtual.h"
+
+/* Of --only. */
+#define STABILITY_KEYS                                                                         \
+  "map, integrator, stiffness, mass, contacts, coupling, layout, hand, delay_ticks, quantum, " \
+  "missed, body, field, bound, haptic_hz, guard"
+
 #define STABILITY_DEVICE_MASS 0.1    /* kg */
 #define STABILITY_DEVICE_DAMPING 0.2 /* N s/m */
 #define STABILITY_HAPTIC_HZ 1000.0
@@ -66,6 +73,20 @@ typedef struct stability_result {
   int touched;     /* contacts that pushed at once */
   bool proxied;    /* at the end */
 } stability_result;
+
+/* The account above. Zeroed but for finite. */
+typedef struct stability_account {
+  double lost;   /* J, to the device's damping */
+  double made;   /* J, largest */
+  double stored; /* J, largest */
+  bool finite;
+} stability_account;
+
+/* Once a tick, of this length. kinetic: J of the bodies; springs: J in them. */
+void stability_account_tick(stability_account *io, const hapi_virtual_port *was,
+                            const hapi_virtual_port *now, double period, double kinetic,
+                            double springs);
+double stability_account_ratio(const stability_account *account);
 
 const char *stability_hand_word(stability_hand hand); /* as the virtual device spells it */
 const char *stability_layout_word(stability_layout layout);

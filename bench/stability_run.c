@@ -37,10 +37,7 @@ typedef struct stability_bed {
   hap_session *session;
   hap_pointer_id pointer;
   double kinetic; /* J, of the bodies after the newest tick */
-  double lost;    /* J, to the device's damping */
-  double made;    /* J, largest */
-  double stored;
-  bool finite;
+  stability_account energy;
 } stability_bed;
 
 /* ---- the bed ---- */
@@ -159,7 +156,7 @@ static hap_status open_bed(bench *b, const stability_point *point, const char *h
   char spec[256];
   memset(s, 0, sizeof *s);
   s->point = point;
-  s->finite = true;
+  s->energy.finite = true;
   s->world = dWorldCreate();
   s->space = dHashSpaceCreate(NULL);
   dWorldSetCFM(s->world, 1e-12);
@@ -242,8 +239,9 @@ static double springs_energy(const stability_bed *s)
   return sum;
 }
 
-static void tick_account(stability_bed *s, const hapi_virtual_port *was,
-                         const hapi_virtual_port *now, double period)
+void stability_account_tick(stability_account *io, const hapi_virtual_port *was,
+                            const hapi_virtual_port *now, double period, double kinetic,
+                            double springs)
 {
   double way[3];
   hapi_v3_sub(now->position, was->position, way);
@@ -251,13 +249,19 @@ static void tick_account(stability_bed *s, const hapi_virtual_port *was,
   double mean = hapi_v3_dot(way, way) / (period * period);
   double ends =
       0.5 * (hapi_v3_dot(was->velocity, was->velocity) + hapi_v3_dot(now->velocity, now->velocity));
-  s->lost += STABILITY_DEVICE_DAMPING * period * (2.0 * mean + ends) / 3.0;
-  double made = now->work - s->lost + s->kinetic;
-  double held = fmin(springs_energy(s), fmax(0.0, -made)); /* no more than was taken */
-  double stored = s->kinetic + held + 0.5 * now->mass * hapi_v3_dot(now->velocity, now->velocity);
-  s->finite = s->finite && isfinite(made) && isfinite(stored);
-  s->made = fmax(s->made, made);
-  s->stored = fmax(s->stored, stored);
+  io->lost += STABILITY_DEVICE_DAMPING * period * (2.0 * mean + ends) / 3.0;
+  double made = now->work - io->lost + kinetic;
+  double held = fmin(springs, fmax(0.0, -made)); /* no more than was taken */
+  double stored = kinetic + held + 0.5 * now->mass * hapi_v3_dot(now->velocity, now->velocity);
+  io->finite = io->finite && isfinite(made) && isfinite(stored);
+  io->made = fmax(io->made, made);
+  io->stored = fmax(io->stored, stored);
+}
+
+double stability_account_ratio(const stability_account *account)
+{
+  return account->finite && account->stored > 0.0 ? 1.0 + account->made / account->stored
+                                                  : HUGE_VAL;
 }
 
 /* ---- runs ---- */
@@ -307,20 +311,20 @@ static void tick_once(stability_bed *s, uint64_t index, hapi_virtual_port *port,
   (void)hap_session_advance(s->session, 1);
   bodies_look(s);
   hapi_virtual_get_port(hapi_device_self(s->device), port);
-  tick_account(s, &was, port, period);
+  stability_account_tick(&s->energy, &was, port, period, s->kinetic, springs_energy(s));
   *way = fmax(*way, -port->position[2]);
 }
 
 static void run_finish(stability_bed *s, double way, int touched, stability_result *out)
 {
   const hapi_tick *tick = &s->session->haptic->tick;
-  out->energy_ratio = s->finite && s->stored > 0.0 ? 1.0 + s->made / s->stored : HUGE_VAL;
-  out->stable = s->finite && tick->guard.latch.fault == HAP_FAULT_NONE &&
+  out->energy_ratio = stability_account_ratio(&s->energy);
+  out->stable = s->energy.finite && tick->guard.latch.fault == HAP_FAULT_NONE &&
                 out->energy_ratio <= STABILITY_RATIO;
   out->held = tick->pointers.of[0].coupling.hold;
   out->residual = tick->rows.residual_max;
   out->way = way;
-  out->stored = s->stored;
+  out->stored = s->energy.stored;
   out->touched = touched;
   out->proxied = tick->pointers.of[0].proxied;
 }
@@ -339,7 +343,7 @@ hap_status stability_run(bench *b, const stability_point *point, double seconds,
     int touched = 0;
     uint64_t ticks = (uint64_t)llround(seconds * STABILITY_HAPTIC_HZ);
     hapi_virtual_get_port(hapi_device_self(s.device), &port);
-    for (uint64_t i = 0; i < ticks && s.finite; ++i) {
+    for (uint64_t i = 0; i < ticks && s.energy.finite; ++i) {
       tick_once(&s, i, &port, &way);
       int pushing = (int)s.session->haptic->tick.touches.pushing;
       touched = pushing > touched ? pushing : touched;

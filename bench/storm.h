@@ -47,8 +47,8 @@ typedef struct storm_result {
   hap_stats stats; /* since the last start */
   uint64_t edits;
   uint64_t untold;
-  uint64_t lost; /* in all runs */
-  uint64_t faults;
+  uint64_t lost;       /* in all runs */
+  uint64_t faults;     /* but of a machine that keeps the loop from running */
   uint64_t unexpected; /* answers of the session that should not be */
   uint64_t posts_run;
   uint64_t posts_taken;

@@ -20,11 +20,16 @@ int main(void)
   ode.world = dWorldCreate(), ode.space = dHashSpaceCreate(NULL);
   /* fingers that close and open a gripper of 80 mm; LEDs and a vibrator that nobody sees */
   const char *spec =
-      "virtual:hand=relaxed,gripper=0:0.07;1:0.01;2:0.07,gripper_force=8,leds=1,vibrators=1";
+      "virtual:hand=relaxed,gripper=0:0.07;1:0.01;2:0.07,gripper_force=8,gripper_stiffness=400,"
+      "leds=1,vibrators=1";
   if (hap_session_create(&def, &ode, &session, &why) < HAP_OK ||
       hap_device_open(spec, &hand_def.device, &why) < HAP_OK ||
       hap_pointer_add(session, &hand_def, &hand) < HAP_OK) {
     return fprintf(stderr, "%s\n", why.text), 1;
+  }
+  hap_axis_info gripper; /* the egg is as stiff as the gripper holds */
+  if (hap_device_get_axis(hand_def.device, 0, 0, &gripper, sizeof gripper) < HAP_OK) {
+    return 1;
   }
   hap_pointer_outputs outputs; /* an egg of 40 mm between the fingers */
   hap_pointer_outputs_init(&outputs, sizeof outputs);
@@ -44,7 +49,8 @@ int main(void)
         hap_pointer_get(session, hand, &state, sizeof state) < HAP_OK) {
       return 1;
     }
-    outputs.axes[0].stiffness = state.axes[0] < 0.04 ? 400 : 0; /* it pushes, and does not pull */
+    /* it pushes, and does not pull */
+    outputs.axes[0].stiffness = state.axes[0] < 0.04 ? gripper.rated_stiffness : 0;
     (void)hap_session_events(session, events, 16, sizeof *events, &count);
     for (size_t i = 0; i < count; ++i) {
       if (events[i].kind == HAP_EVENT_GRIPPER) {
@@ -60,6 +66,8 @@ int main(void)
              state.axis_forces[0]);
     }
   }
+  (void)hap_pointer_get_outputs(session, hand, &outputs);
+  printf("the gripper was promised %.2f W at most\n", outputs.axes[0].max_power);
   hap_session_destroy(session);
   hap_device_close(hand_def.device);
   return 0;

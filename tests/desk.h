@@ -94,6 +94,22 @@ static inline void desk_move(desk *d, double x, double y, double z, int ticks)
   }
 }
 
+/* A hand in the air at a place, whose ramp-in is over. */
+static inline desk *desk_in_air(double x, double y, double z)
+{
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  desk_run(d, x, y, z);
+  desk_wait(d, 40);
+  return d;
+}
+
+static inline hap_pointer_state desk_state(const desk *d)
+{
+  hap_pointer_state state;
+  REQUIRE(hap_pointer_get(d->session, d->hand, &state, sizeof state) == HAP_OK);
+  return state;
+}
+
 /* In real time, to a file of that name. The caller starts it, and stops it at the end. */
 static inline void desk_record(desk *d, const char *name, double height)
 {
@@ -135,6 +151,20 @@ static inline void desk_play(desk *d)
   }
   (void)hap_session_detail(d->session, &detail);
   REQUIRE_SAY(status == HAP_END, "%s", detail.text);
+}
+
+/* Through to its end: the same ticks, and the same wrench on the hand as in that state. */
+static inline void desk_replay_compare(desk *d, hap_pointer_id hand, const hap_pointer_state *last)
+{
+  hap_play_difference difference;
+  hap_pointer_state again;
+  desk_play(d);
+  REQUIRE(hap_player_difference(d->player, &difference, sizeof difference) == HAP_OK);
+  CHECK_SAY(difference.what == HAP_DIFFERENCE_NONE, "%s", difference.text);
+  REQUIRE(hap_pointer_get(d->session, hand, &again, sizeof again) == HAP_OK);
+  CHECK(memcmp(&again.wrench, &last->wrench, sizeof last->wrench) == 0);
+  CHECK(memcmp(&again.own, &last->own, sizeof last->own) == 0);
+  CHECK(again.stamp_ns == last->stamp_ns);
 }
 
 /* In real time. */

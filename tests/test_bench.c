@@ -330,7 +330,7 @@ TEST(stability_knows_its_points)
       "stiff=1", "mass", "mass=", "mass=1/", "mass=1x", "hand=,body=cube"};
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
     CHECK(bench_run("stability --only %s", wrong[i]) == 1);
-    CHECK(said_lines("keys are integrator, stiffness") == 1);
+    CHECK(said_lines("keys are map, integrator, stiffness") == 1);
   }
   CHECK(bench_run("stability --only mass=3") == 1);
   CHECK(said_lines("no such point") == 1);

@@ -39,13 +39,6 @@ static hap_force_id force_add(desk *d, const hap_force_def *def)
   return id;
 }
 
-static hap_pointer_state state_of(desk *d)
-{
-  hap_pointer_state state;
-  REQUIRE(hap_pointer_get(d->session, d->hand, &state, sizeof state) == HAP_OK);
-  return state;
-}
-
 typedef struct momentum {
   double linear[3];
   double angular[3]; /* about the origin of the world */
@@ -54,7 +47,7 @@ typedef struct momentum {
 /* What the hand got in a tick. */
 static void momentum_take(desk *d, momentum *io)
 {
-  hap_pointer_state s = state_of(d);
+  hap_pointer_state s = desk_state(d);
   const double *h = s.device.position;
   const double *f = s.wrench.force;
   for (int i = 0; i < 3; ++i) {
@@ -120,7 +113,7 @@ TEST(what_the_hand_gets_the_body_gets_the_other_way)
       desk_wait(d, 1);
       momentum_take(d, &hand);
     }
-    check_vector(state_of(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
+    check_vector(desk_state(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
     dBodyGetMass(ball, &mass);
     momentum body = momentum_of(ball, mass.I[0]);
     double size = 0.0;
@@ -154,7 +147,7 @@ static double swing_listen(desk *d)
   double force[2] = {0.0, 0.0};
   for (int i = 0; i < 1000; ++i) {
     desk_wait(d, 1);
-    double now = state_of(d).wrench.force[0];
+    double now = desk_state(d).wrench.force[0];
     if (i >= 2) {
       wrong = fmax(wrong, fabs(now - 2.0 * cos(turn) * force[1] + force[0]));
     }
@@ -250,7 +243,7 @@ static void drawer_run(hap_model model, double physics_hz, double *out_force, in
     d->velocity[0] = (hand_way(T * (i + 1)) - hand_way(T * i)) / T;
     hand_lead(d);
     REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
-    out_force[i] = state_of(d).wrench.force[0];
+    out_force[i] = desk_state(d).wrench.force[0];
   }
   tap_release(d);
 }
@@ -308,7 +301,7 @@ TEST(a_place_goes_with_a_body_that_turns)
     d->at[0] = 0.1 + along * cos(angle);
     d->at[1] = along * sin(angle);
     desk_wait(d, 1);
-    check_vector(state_of(d).wrench.force, -cos(angle), -sin(angle), 0.0, 1e-6);
+    check_vector(desk_state(d).wrench.force, -cos(angle), -sin(angle), 0.0, 1e-6);
   }
 }
 
@@ -325,10 +318,10 @@ TEST(a_kinematic_body_takes_the_place_along_and_is_not_pushed)
   def.stiffness = 100.0;
   (void)force_add(d, &def);
   desk_wait(d, 60);
-  double before = state_of(d).wrench.force[2];
+  double before = desk_state(d).wrench.force[2];
   for (int i = 0; i < 200; ++i) { /* 5 mN a tick, at each tick and not at each step of the world */
     desk_wait(d, 1);
-    double now = state_of(d).wrench.force[2];
+    double now = desk_state(d).wrench.force[2];
     CHECK_NEAR(now - before, 100.0 * 0.05 * T, 1e-6);
     before = now;
   }
@@ -351,7 +344,7 @@ TEST(a_magnet_wakes_a_body_at_rest)
   (void)force_add(d, &def);
   desk_wait(d, 500);
   CHECK(dBodyIsEnabled(ball) == 0); /* far off */
-  check_vector(state_of(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
+  check_vector(desk_state(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
   desk_move(d, -0.3, 0.0, -0.01, 600); /* over it: 6 cm up */
   desk_wait(d, 400);
   CHECK(dBodyGetPosition(ball)[2] > BALL + 0.01); /* it is lifted */
@@ -371,7 +364,7 @@ TEST(a_body_that_goes_or_is_put_elsewhere_takes_no_force_in_one_step)
     def.stiffness = 100.0;
     hap_force_id id = force_add(d, &def);
     desk_wait(d, 60);
-    double before = state_of(d).wrench.force[0];
+    double before = desk_state(d).wrench.force[0];
     CHECK_NEAR(before, -10.0, 0.01);
     if (how == 0) {
       REQUIRE(hap_session_lock(d->session) == HAP_OK);
@@ -391,7 +384,7 @@ TEST(a_body_that_goes_or_is_put_elsewhere_takes_no_force_in_one_step)
     }
     for (int i = 0; i < 100; ++i) {
       desk_wait(d, 1);
-      double now = state_of(d).wrench.force[0];
+      double now = desk_state(d).wrench.force[0];
       CHECK_SAY(fabs(now - before) <= 20.0 / 20.0 + 0.01, "%g to %g", before, now);
       before = now;
     }
@@ -399,7 +392,7 @@ TEST(a_body_that_goes_or_is_put_elsewhere_takes_no_force_in_one_step)
     if (how == 1) { /* it is bound anew */
       CHECK(hap_pointer_force_set(d->session, d->hand, id, &def) == HAP_OK);
       desk_wait(d, 100);
-      CHECK_NEAR(state_of(d).wrench.force[0], 10.0, 0.02);
+      CHECK_NEAR(desk_state(d).wrench.force[0], 10.0, 0.02);
     }
     CHECK(hap_pointer_force_remove(d->session, d->hand, id) == HAP_OK);
     tap_release(d);
@@ -427,7 +420,7 @@ TEST(a_light_body_on_a_stiff_spring_is_bounded)
       fastest = k > 1000 ? fmax(fastest, fabs(v)) : fastest;
     }
     CHECK_SAY(fastest < 0.5, "%g kg: %g m/s", masses[i], fastest);
-    double felt = fabs(state_of(d).wrench.force[0]);
+    double felt = fabs(desk_state(d).wrench.force[0]);
     CHECK_SAY(felt < 1.0, "%g kg: %g N", masses[i], felt);
     CHECK(session_stats(d->session).faults.count == 0);
     tap_release(d);
@@ -467,21 +460,10 @@ TEST(wrong_bonds_are_refused)
 
 TEST(a_replay_has_the_bonds)
 {
-  hap_detail detail = {""};
-  hap_record_def file;
-  hap_player *player = NULL;
-  REQUIRE(folder_make());
-  hap_record_def_init(&file, sizeof file);
-  file.path = folder_path("bonds.rec");
   desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
-  d->def.drive = HAP_DRIVE_THREADS;
-  d->def.rt_priority = 0;
   dBodyID ball = ode_ball(d->world, d->space, MASS, BALL, (const double[3]){0.0, 0.0, 0.0});
-  d->session = session_make(&d->def, &d->ode);
-  REQUIRE(hap_session_record(d->session, &file, &detail) == HAP_OK);
-  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
   d->at[0] = 0.2;
-  hand_lead(d);
+  desk_record(d, "bonds.rec", 0.0);
   session_run(d->session);
   desk_glide(d, 0.0, 0.0, 0.01);
   hap_force_def def = bound_def(HAP_FORCE_SPRING, ball);
@@ -490,31 +472,13 @@ TEST(a_replay_has_the_bonds)
   desk_glide(d, 0.0, 0.02, 0.0);
   desk_glide(d, 0.05, 0.0, 0.0);
   CHECK(hap_session_stop(d->session) == HAP_OK);
-  hap_pointer_state last = state_of(d);
+  hap_pointer_state last = desk_state(d);
   hap_pointer_id hand = d->hand;
   tap_release(d);
 
   desk *r = desk_new(0.0, HAP_MODEL_CONTACT);
-  hap_expert_def expert;
-  hap_research_def research;
   (void)ode_ball(r->world, r->space, MASS, BALL, (const double[3]){0.0, 0.0, 0.0});
-  hap_expert_def_init(&expert, sizeof expert);
-  hap_research_def_init(&research, sizeof research);
-  REQUIRE(hap_player_open(file.path, HAP_PLAY_WHOLE, &player, &detail) >= HAP_OK);
-  REQUIRE(hap_player_get_def(player, &r->def, &expert, &research) >= HAP_OK);
-  r->session = session_make(&r->def, &r->ode);
-  REQUIRE(hap_session_play(r->session, player, &detail) >= HAP_OK);
-  session_run(r->session);
-  hap_status status = HAP_OK;
-  while (status == HAP_OK) {
-    status = hap_session_advance(r->session, 100);
-  }
-  CHECK(status == HAP_END);
-  hap_pointer_state again;
-  REQUIRE(hap_pointer_get(r->session, hand, &again, sizeof again) == HAP_OK);
-  CHECK(memcmp(&again.wrench, &last.wrench, sizeof last.wrench) == 0);
+  desk_replay(r, "bonds.rec");
+  desk_replay_compare(r, hand, &last);
   CHECK(last.own.force[0] != 0.0);
-  hap_session_destroy(r->session);
-  r->session = NULL;
-  hap_player_close(player);
 }

@@ -11,7 +11,7 @@
 #include <signal.h>
 #include <time.h>
 
-#define POINTS 38
+#define POINTS 39
 
 static pid_t check_start(const char *spec, const char *options)
 {
@@ -103,6 +103,9 @@ static const struct {
     {"nan_is_held", "write_not_finite_gives_no_force"},
     {"axis_is_nan", "axes_are_within_their_ranges"},
     {"axis_is_beyond", "axes_are_within_their_ranges"},
+    {"axis_rate_is_double", "axis_rates_fit_the_axes"},
+    {"axis_rate_is_against", "axis_rates_fit_the_axes"},
+    {"axis_rate_is_none", "axis_rates_fit_the_axes"},
     {"workspace_is_elsewhere", "poses_are_in_the_workspace"},
     {"axis_gives_double", "axis_forces_are_reached"},
     {"axis_gives_against", "axis_forces_are_reached"},
@@ -152,7 +155,7 @@ TEST(without_a_fault_every_point_holds)
 {
   int code = device_check(broken_check("none"), "");
   CHECK(code == 0 && lines_from(ran.out, "not ok") == 0 && lines_from(ran.out, "ok ") == POINTS);
-  CHECK(lines_from(ran.out, "1..38") == 1);
+  CHECK(lines_from(ran.out, "1..39") == 1);
   if (code != 0) {
     output_show();
   }
@@ -230,8 +233,8 @@ TEST(a_device_is_followed_through_its_plug)
 {
   int code = device_check(broken_check("unplugged"), "--check-unplug 3");
   printf("# exit code %d\n", code);
-  CHECK(lines_from(ran.out, "ok 38 - unplugged") == 1 &&
-        lines_from(ran.out, "ok 38 - unplugged # SKIP") == 0);
+  CHECK(lines_from(ran.out, "ok 39 - unplugged") == 1 &&
+        lines_from(ran.out, "ok 39 - unplugged # SKIP") == 0);
   CHECK(device_check(broken_check("none"), "--check-unplug 3") == 1 && caught_by("unplugged"));
   CHECK(strstr(ran.out, "nobody unplugged it") != NULL);
 }

@@ -191,6 +191,25 @@ TEST(a_torque_without_power_only_brakes)
   }
 }
 
+/* A torque beyond its promise is told where force and power are within theirs. A way whose square
+ * is zero in a double has no direction to shorten along: the force stays as it was. */
+TEST(a_torque_alone_may_be_too_much_and_no_way_is_too_short)
+{
+  const hapi_promise promise = {10.0, 0.3, 2.0};
+  const hapi_declared still = {.any = false};
+  hap_wrench w = {{4.0, 0.0, 0.0}, {0.0, 0.0, 0.5}};
+  hapi_purse purse;
+  hapi_purse_fill(&purse, &promise);
+  CHECK(hapi_promise_keep(&promise, &purse, &still, T, &w));
+  CHECK(w.force[0] == 4.0);
+  CHECK_NEAR(w.torque[2], 0.3, 1e-12);
+  const hapi_promise brake = {10.0, 1.0, 0.0};
+  const hapi_declared way = {.way = {1e-200, 0.0, 0.0}};
+  hapi_purse_fill(&purse, &brake);
+  w.torque[2] = 0.0;
+  CHECK(hapi_promise_keep(&brake, &purse, &way, T, &w) && w.force[0] == 4.0);
+}
+
 /* Half of what it may give in 100 ms: half of the force, until the debt is forgiven. */
 TEST(who_gave_too_much_pays_with_force)
 {

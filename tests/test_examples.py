@@ -26,7 +26,13 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "own_forces": "docs/forces.md",
     "sandpaper_and_ice": "docs/surfaces.md",
     "tap_materials": "docs/surfaces.md",
+    "fridge_magnet": "docs/surfaces.md",
     "push_without_ode": "docs/scene.md",
+    "list_a_scene": "docs/scene.md",
+    "edit_a_scene": "docs/scene.md",
+    "change_while_running": "docs/editing.md",
+    "near_the_hand": "docs/touches.md",
+    "wrap_a_device": "docs/writing-a-device.md",
     "grip_and_feel": "docs/grippers.md",
     "two_fingers": "docs/fingers.md",
     "lift_door": "docs/platforms.md",
@@ -35,6 +41,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "follow_a_path": "docs/force-calls.md",
     "drawer_with_detents": "docs/body-forces.md",
     "tool_in_hand": "docs/grab.md",
+    "one_way_platform": "docs/contacts.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -180,6 +187,16 @@ def check_tap_materials(program):
     point(max(abs(float(f)) for _, _, _, f in rows) < 5.0, "no more than 5 N")
 
 
+def check_fridge_magnet(program):
+    rows = rows_of(run(program), r"^ *(\d+) ms hand at +(-?[0-9.]+) +(-?[0-9.]+) m, feels +"
+                                 r"(-?[0-9.]+) +(-?[0-9.]+) N, note +(-?[0-9.]+) mm up$")
+    at = {int(row[0]): [float(x) for x in row[1:]] for row in rows}
+    point(len(rows) == 30 and abs(at[1400][3] + 0.196) < 0.01 and at[1400][4] > 30.0,
+          "the note hangs on the finger", str(at[1400]))
+    point(at[1800][3] == 0.0 and abs(at[1800][4]) < 1.0, "a jerk drops it", str(at[1800]))
+    point(at[2600][2] == 0.0 and at[2800][2] > 0.5, "the door pulls", str(at[2800]))
+
+
 def check_own_forces(program):
     rows = rows_of(run(program),
                    r"^ *([0-9.]+) mm: +(-?[0-9.]+) N along, +(-?[0-9.]+) N to the rail$")
@@ -220,6 +237,56 @@ def check_push_without_ode(program):
           str(rows))
 
 
+def check_list_a_scene(program):
+    out = run(program)
+    point("geom 0: box of body 0, 0.30 x 0.02 x 0.30 m" in out, "it lists the door", out)
+    turned = re.search(r"^joint 0: kind 1 at ([0-9.]+) rad$", out, re.M)
+    point(turned is not None and 0.05 < float(turned.group(1)) < 0.5, "which is half open", out)
+    said = re.search(r"^the hand presses on geom 0 of a body of 1 kg, and feels (-[0-9.]+) N$", out,
+                     re.M)
+    point(said is not None, "the hand presses on it", out)
+
+
+def check_edit_a_scene(program):
+    out = run(program)
+    rows = rows_of(out, r"^\d s  table at ([0-9.]+) m, wheel at ([0-9.]+) m, "
+                        r"ball ([0-9.]+) m along$")
+    table, wheel, ball = ([float(row[i]) for row in rows] for i in range(3))
+    point(len(rows) == 6 and all(abs(table[i] - 0.02 * i) < 0.001 for i in range(6)),
+          "the table rises from the first second on", out)
+    point(len(rows) == 6 and wheel[:4] == [0.5] * 4 and 0.1 < wheel[4] < 0.3,
+          "the wheel falls when its axle is taken away", out)
+    point(len(rows) == 6 and ball[0] < ball[1] < ball[2] > ball[3] < ball[4] < ball[5],
+          "the ball is blown along, put back and blown again", out)
+
+
+def check_change_while_running(program):
+    out = run(program)
+    rows = rows_of(out, r"^\d s  .* cube at ([0-9.]+) m, hand feels (-?[0-9.]+) N, (\d+) steps$")
+    steps = [int(row[2]) for row in rows]
+    point(len(rows) == 6 and float(rows[1][1]) < -1.0, "the hand pushes three cubes", out)
+    point(len(rows) == 6 and 85 <= steps[4] - steps[3] <= 95 and steps[5] - steps[4] > 900,
+          "rate and model change", out)
+
+
+def check_near_the_hand(program):
+    out = run(program)
+    rows = rows_of(out, r"^[0-9.]+ s  cubes at ([0-9.]+) and ([0-9.]+) m, roles (\d) and (\d), "
+                        r"(\d) contacts$")
+    point(len(rows) == 6 and abs(float(rows[3][1]) - float(rows[3][0]) - 0.05) < 0.001,
+          "the cubes go together", out)
+    point(len(rows) == 6 and rows[3][2:4] == ("1", "1") and rows[5][2:4] == ("0", "0"),
+          "the loop has them while there is a hand", out)
+    point(len(rows) == 6 and rows[4][1] == "0.300" and int(rows[4][4]) < int(rows[3][4]),
+          "the second one is put elsewhere", out)
+    point("ODE told moves of the first cube" in out, "ODE tells what moves", out)
+
+
+def check_wrap_a_device(program):
+    said = re.match(r"at most ([0-9.]+) N, of 20 that the device can\n", run(program))
+    point(said is not None and 0.8 < float(said.group(1)) < 1.5, "the hand trembles less")
+
+
 def check_grip_and_feel(program):
     out = run(program)
     rows = rows_of(out, r"^([0-9.]+) s +([0-9.]+) mm, (-?[0-9.]+) N$")
@@ -227,6 +294,7 @@ def check_grip_and_feel(program):
           "where the springs of egg and fingers agree", out)
     point(out.count("holds the egg") == 1 and out.count("lets it go") == 1,
           "closing and opening are told once", out)
+    point("was promised 0." in out or "was promised 1." in out, "what was set is given back", out)
 
 
 def check_two_fingers(program):
@@ -236,6 +304,18 @@ def check_two_fingers(program):
     point(len(rows) == 5 and all(abs(float(row[0]) + float(row[1])) < 0.02 for row in rows),
           "they push against each other", str(rows))
     point(len(rows) == 5 and 0.12 < float(rows[-1][2]) < 0.131, "and lift it", str(rows))
+
+
+def check_one_way_platform(program):
+    out = run(program)
+    rows = rows_of(out, r"^([0-9.]+) s  box (-?[0-9.]+) m above the platform, hand feels "
+                        r"(-?[0-9.]+) N$")
+    point(len(rows) == 9, "it prints a line a half second", out)
+    point(len(rows) == 9 and float(rows[0][1]) < -0.05 and float(rows[3][1]) > 0.0,
+          "the box comes from below", out)
+    point(len(rows) == 9 and 2.5 < float(rows[3][2]) < 3.3, "the hand carries the box", out)
+    point(len(rows) == 9 and abs(float(rows[-1][1])) < 0.001 and float(rows[-1][2]) == 0.0,
+          "the box lies on the platform", out)
 
 
 def check_lift_door(program):

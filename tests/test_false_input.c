@@ -5,7 +5,6 @@
 
 #include "tests/tap.h"
 
-#include <dirent.h>
 #include <stdint.h>
 #include <unistd.h>
 
@@ -19,6 +18,7 @@
 #include "plugins/spidar/belief.h"
 #include "plugins/spidar/calibration.h"
 #include "pointer/plausible.h"
+#include "tests/recorded_hand.h"
 
 #define MS 1000000LL
 
@@ -491,53 +491,6 @@ TEST(devices_that_tell_seldom)
   }
 }
 
-/* A recording: times [s] and places. */
-typedef struct recorded {
-  int rows;
-  double t[12000];
-  double x[12000][3];
-} recorded;
-
-static recorded played;
-
-static void recording_load(const char *path)
-{
-  FILE *file = fopen(path, "r");
-  char line[512];
-  REQUIRE(file != NULL);
-  played.rows = 0;
-  while (fgets(line, sizeof line, file) != NULL && played.rows < 12000) {
-    double *x = played.x[played.rows];
-    played.rows +=
-        sscanf(line, "%lf,%lf,%lf,%lf", &played.t[played.rows], &x[0], &x[1], &x[2]) == 4;
-  }
-  fclose(file);
-  REQUIRE(played.rows > 100);
-}
-
-/* By cubics through the rows; *io_row goes on with the time. */
-static void recording_at(double t, int *io_row, double out[3])
-{
-  while (*io_row < played.rows - 3 && played.t[*io_row + 1] <= t) {
-    ++*io_row;
-  }
-  int i = *io_row > 0 ? *io_row : 1;
-  double h = played.t[i + 1] - played.t[i];
-  double u = (t - played.t[i]) / h;
-  for (int k = 0; k < 3; ++k) {
-    double slope[2];
-    for (int side = 0; side < 2; ++side) {
-      int at = i + side;
-      slope[side] =
-          h * (played.x[at + 1][k] - played.x[at - 1][k]) / (played.t[at + 1] - played.t[at - 1]);
-    }
-    double a = played.x[i][k];
-    double c = played.x[i + 1][k] - a;
-    out[k] = a + u * (slope[0] + u * ((3.0 * c - 2.0 * slope[0] - slope[1]) +
-                                      u * (slope[0] + slope[1] - 2.0 * c)));
-  }
-}
-
 /* What a device makes of a hand. */
 typedef struct told_how {
   double hz;
@@ -556,12 +509,11 @@ static double dice_throw(uint32_t *io)
 static int hand_play(const told_how *how, double seconds)
 {
   int refused = 0;
-  int row = 0;
   uint32_t seed = 7;
   double x[3] = {0.0, 0.0, 0.0};
   double told = -1.0;
-  double begin = played.t[1];
-  double end = hapi_min(played.t[played.rows - 3], begin + seconds);
+  double begin = recorded_hand_begin();
+  double end = hapi_min(recorded_hand_end(), begin + seconds);
   hand_begin();
   hand.velocity.quantum = how->quantum;
   for (int64_t tick = 0;; ++tick) {
@@ -571,7 +523,7 @@ static int hand_play(const told_how *how, double seconds)
     }
     hand_ns = (int64_t)(1e9 * (double)tick / how->hz);
     if (told < 0.0 || t - told > how->every_s - 1e-7) {
-      recording_at(t, &row, x);
+      recorded_hand_at(t, x);
       for (int k = 0; k < 3; ++k) {
         x[k] += how->noise * dice_throw(&seed);
         x[k] = how->quantum > 0.0 ? how->quantum * round(x[k] / how->quantum) : x[k];
@@ -602,23 +554,12 @@ static void recording_play(const char *name)
 
 TEST(recorded_hands_are_believed)
 {
-  const char *shared = getenv("HAPODE_SHARED");
-  char folder[1000];
-  snprintf(folder, sizeof folder, "%s/data", shared != NULL ? shared : ".");
-  DIR *files = opendir(folder);
-  if (files == NULL) {
+  if (!recorded_hands_open()) {
     SKIP("needs the recordings of HAPODE_SHARED/data");
   }
-  const struct dirent *entry;
-  while ((entry = readdir(files)) != NULL) {
-    char path[1400];
-    if (strstr(entry->d_name, ".csv") != NULL) {
-      snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
-      recording_load(path);
-      recording_play(entry->d_name);
-    }
+  while (recorded_hands_next()) {
+    recording_play(played.name);
   }
-  closedir(files);
 }
 
 /* ---- strings by themselves ---- */

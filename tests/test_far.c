@@ -61,18 +61,25 @@ static void fill_space(dSpaceID space, dGeomID geoms[GEOMS])
   }
 }
 
+static hapi_spaces spaces_of(dSpaceID space)
+{
+  return (hapi_spaces){.list = {{.space = space}}, .count = 1};
+}
+
 /* A round of questions along a way, of which some leave what the round before covered. */
 static int ask_round(hapi_cover *cover, dSpaceID space, dGeomID asker, double from)
 {
   static answer plain;
   static answer covered;
   int found = 0;
+  const hapi_spaces spaces = spaces_of(space);
+  const hapi_cover_question question = {&spaces, HAPI_SPACES_ALL, asker};
   hapi_cover_begin(cover);
   for (int i = 0; i < ASKED; ++i) {
     dGeomSetPosition(asker, from + 0.1 * i, random_uniform(-1, 1), 0.0);
     plain = (answer){.asker = asker};
     covered = (answer){.asker = asker};
-    hapi_cover_ask(cover, space, asker, &covered, pair_note);
+    hapi_cover_ask(cover, &question, &covered, pair_note);
     dSpaceCollide2(asker, (dGeomID)space, &plain, pair_note);
     CHECK(covered.count == plain.count);
     CHECK(memcmp(covered.geoms, plain.geoms, sizeof plain.geoms) == 0);
@@ -124,6 +131,8 @@ TEST(a_round_asks_the_space_seldom)
   hapi_cover cover = {0};
   static answer got;
   int fills[2] = {0, 0};
+  const hapi_spaces spaces = spaces_of(space);
+  const hapi_cover_question question = {&spaces, HAPI_SPACES_ALL, asker};
   REQUIRE(hapi_cover_create(&cover));
   for (int round = 0; round < 2; ++round) {
     hapi_cover_begin(&cover);
@@ -133,7 +142,7 @@ TEST(a_round_asks_the_space_seldom)
       got = (answer){.asker = asker};
       dGeomSetPosition(asker, 0.1 * i, 0, 0);
       dGeomGetAABB(cover.box_geom, before);
-      hapi_cover_ask(&cover, space, asker, &got, pair_note);
+      hapi_cover_ask(&cover, &question, &got, pair_note);
       dGeomGetAABB(cover.box_geom, after);
       fills[round] += memcmp(before, after, sizeof after) != 0;
     }

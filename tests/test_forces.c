@@ -30,22 +30,6 @@ static hap_force_id force_add(desk *d, const hap_force_def *def)
   return id;
 }
 
-/* A hand in the air at a place, whose ramp-in is over. */
-static desk *air_desk(double x, double y, double z)
-{
-  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
-  desk_run(d, x, y, z);
-  desk_wait(d, 40);
-  return d;
-}
-
-static hap_pointer_state state_of(desk *d)
-{
-  hap_pointer_state state;
-  REQUIRE(hap_pointer_get(d->session, d->hand, &state, sizeof state) == HAP_OK);
-  return state;
-}
-
 /* A tick at this place and velocity; what the hand feels. */
 static hap_wrench felt_at(desk *d, const double at[3], const double velocity[3])
 {
@@ -53,7 +37,7 @@ static hap_wrench felt_at(desk *d, const double at[3], const double velocity[3])
   memcpy(d->velocity, velocity, sizeof d->velocity);
   hand_lead(d);
   REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
-  return state_of(d).wrench;
+  return desk_state(d).wrench;
 }
 
 static void detail_has(desk *d, const char *words)
@@ -73,7 +57,7 @@ static void detail_has(desk *d, const char *words)
 
 TEST(a_constant_force_is_felt_as_it_is_and_in_the_axes_of_the_hand)
 {
-  desk *d = air_desk(0.0, 0.0, 0.3);
+  desk *d = desk_in_air(0.0, 0.0, 0.3);
   hap_force_def def = force_of(HAP_FORCE_CONSTANT);
   def.force[0] = 1.5;
   def.torque[1] = 0.25;
@@ -81,20 +65,20 @@ TEST(a_constant_force_is_felt_as_it_is_and_in_the_axes_of_the_hand)
   hap_wrench felt = felt_at(d, HERE(0.0, 0.0, 0.3), STILL);
   check_vector(felt.force, 1.5, 0.0, 0.0, EXACT);
   check_vector(felt.torque, 0.0, 0.25, 0.0, EXACT);
-  check_vector(state_of(d).own.force, 1.5, 0.0, 0.0, EXACT);
+  check_vector(desk_state(d).own.force, 1.5, 0.0, 0.0, EXACT);
   def.frame = HAP_FORCE_POINTER;
   CHECK(hap_pointer_force_set(d->session, d->hand, id, &def) == HAP_OK);
   const hap_pose quarter = {{0.0, 0.0, 0.3}, {sqrt(0.5), 0.0, 0.0, sqrt(0.5)}}; /* about z */
   REQUIRE(hap_pointer_set_target(d->session, d->hand, &quarter, NULL) == HAP_OK);
   REQUIRE(hap_session_advance(d->session, 40) >= HAP_OK);
-  felt = state_of(d).wrench;
+  felt = desk_state(d).wrench;
   check_vector(felt.force, 0.0, 1.5, 0.0, EXACT);
   check_vector(felt.torque, -0.25, 0.0, 0.0, EXACT);
 }
 
 TEST(a_spring_pulls_to_a_point_a_line_and_a_plane)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_SPRING);
   def.stiffness = 200.0;
   def.damping = 3.0;
@@ -112,13 +96,13 @@ TEST(a_spring_pulls_to_a_point_a_line_and_a_plane)
     check_vector(felt.force, want[target][0], want[target][1], want[target][2], EXACT);
     CHECK(hap_pointer_force_remove(d->session, d->hand, id) == HAP_OK);
     desk_wait(d, 40);
-    check_vector(state_of(d).wrench.force, 0.0, 0.0, 0.0, EXACT);
+    check_vector(desk_state(d).wrench.force, 0.0, 0.0, 0.0, EXACT);
   }
 }
 
 TEST(a_medium_brakes_and_a_weight_hangs_at_its_point)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def medium = force_of(HAP_FORCE_VISCOUS);
   hap_force_def weight = force_of(HAP_FORCE_WEIGHT);
   medium.damping = 4.0;
@@ -135,7 +119,7 @@ TEST(a_medium_brakes_and_a_weight_hangs_at_its_point)
 
 TEST(a_magnet_is_strongest_on_the_way_and_ends_at_its_range)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_MAGNET);
   def.strength = 3.0;
   def.range = 0.03;
@@ -156,7 +140,7 @@ TEST(a_magnet_is_strongest_on_the_way_and_ends_at_its_range)
 
 TEST(detents_hold_at_their_places)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_DETENTS);
   def.strength = 2.0;
   def.pitch = 0.01;
@@ -196,7 +180,7 @@ TEST(springs_magnets_and_detents_do_no_work_on_a_closed_way)
 {
   const hap_force_kind kinds[] = {HAP_FORCE_SPRING, HAP_FORCE_MAGNET, HAP_FORCE_DETENTS};
   for (int k = 0; k < 3; ++k) {
-    desk *d = air_desk(0.025, 0.0, 0.0);
+    desk *d = desk_in_air(0.025, 0.0, 0.0);
     hap_force_def def = force_of(kinds[k]);
     def.stiffness = 100.0;
     def.strength = 2.0;
@@ -223,7 +207,7 @@ static spectrum wave_listen(desk *d, double hz, int ticks)
   spectrum out = {0.0, 0.0};
   for (int i = 0; i < ticks; ++i) {
     REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
-    double force = state_of(d).wrench.force[2];
+    double force = desk_state(d).wrench.force[2];
     sine += force * sin(2.0 * M_PI * hz * i * T) / ticks;
     cosine += force * cos(2.0 * M_PI * hz * i * T) / ticks;
     out.mean += force / ticks;
@@ -236,7 +220,7 @@ TEST(a_vibration_has_its_amplitude_and_no_mean)
 {
   const double hz[] = {7.0, 60.0, 123.0, 250.0, 401.0};
   for (int i = 0; i < 5; ++i) {
-    desk *d = air_desk(0.0, 0.0, 0.0);
+    desk *d = desk_in_air(0.0, 0.0, 0.0);
     hap_force_def def = force_of(HAP_FORCE_VIBRATION);
     def.strength = 1.2;
     def.vibration.hz = hz[i];
@@ -250,7 +234,7 @@ TEST(a_vibration_has_its_amplitude_and_no_mean)
 
 TEST(a_vibration_comes_holds_and_goes)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_VIBRATION);
   def.strength = 2.0;
   def.vibration.hz = 250.0; /* every other tick is a peak */
@@ -264,7 +248,7 @@ TEST(a_vibration_comes_holds_and_goes)
       double t = i * T;
       double envelope = fmax(fmin(fmin(t / 0.1, 1.0), (0.35 - t) / 0.2), 0.0);
       double want = 2.0 * envelope * sin(2.0 * M_PI * 250.0 * t);
-      CHECK_NEAR(state_of(d).wrench.force[2], want, 1e-6);
+      CHECK_NEAR(desk_state(d).wrench.force[2], want, 1e-6);
     }
     def.vibration.restart = 1;
     CHECK(hap_pointer_force_set(d->session, d->hand, id, &def) == HAP_OK);
@@ -274,7 +258,7 @@ TEST(a_vibration_comes_holds_and_goes)
 TEST(samples_are_played_again_and_again)
 {
   float wave[3] = {0.0f, 1.0f, -0.5f};
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_VIBRATION);
   def.strength = 2.0;
   def.vibration.samples = wave;
@@ -285,7 +269,7 @@ TEST(samples_are_played_again_and_again)
   const double want[6] = {0.0, 1.0, 2.0, 0.5, -1.0, -0.5};
   for (int i = 0; i < 60; ++i) {
     REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
-    CHECK_NEAR(state_of(d).wrench.force[2], want[i % 6], 1e-9);
+    CHECK_NEAR(desk_state(d).wrench.force[2], want[i % 6], 1e-9);
   }
 }
 
@@ -304,7 +288,7 @@ static void stroke_feel(hap_model model, double out[3])
   desk_wait(d, 60);
   desk_move(d, 0.0, 0.0, -0.004, 100);
   desk_move(d, 0.1, 0.0, 0.0, 500);
-  memcpy(out, state_of(d).wrench.force, 3 * sizeof out[0]);
+  memcpy(out, desk_state(d).wrench.force, 3 * sizeof out[0]);
   tap_release(d);
 }
 
@@ -334,11 +318,11 @@ TEST(the_hand_feels_it_behind_a_proxy_which_does_not)
   desk_wait(d, 60);
   desk_move(d, 0.0, 0.0, -0.004, 100);
   desk_wait(d, 200);
-  hap_pointer_state before = state_of(d);
+  hap_pointer_state before = desk_state(d);
   def.force[2] = -2.0;
   (void)force_add(d, &def);
   desk_wait(d, 100);
-  hap_pointer_state after = state_of(d);
+  hap_pointer_state after = desk_state(d);
   CHECK_NEAR(after.wrench.force[2], before.wrench.force[2] - 2.0, 1e-6);
   CHECK_NEAR(after.proxy.position[2], before.proxy.position[2], 1e-9);
 }
@@ -347,14 +331,14 @@ TEST(the_hand_feels_it_behind_a_proxy_which_does_not)
 
 TEST(a_force_fades_in_changes_without_a_leap_and_fades_out)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_CONSTANT);
   def.force[0] = 4.0;
   def.fade_in_s = 0.1;
   hap_force_id id = force_add(d, &def);
   for (int i = 1; i <= 120; ++i) {
     desk_wait(d, 1);
-    CHECK_NEAR(state_of(d).wrench.force[0], fmin(0.04 * i, 4.0), EXACT);
+    CHECK_NEAR(desk_state(d).wrench.force[0], fmin(0.04 * i, 4.0), EXACT);
   }
   double before = 4.0;
   def.force[0] = -4.0;
@@ -363,7 +347,7 @@ TEST(a_force_fades_in_changes_without_a_leap_and_fades_out)
     CHECK(hap_pointer_force_set(d->session, d->hand, id, &def) == HAP_OK);
     for (int i = 0; i < (k < 3 ? 7 : 40); ++i) {
       desk_wait(d, 1);
-      double now = state_of(d).wrench.force[0];
+      double now = desk_state(d).wrench.force[0];
       CHECK(fabs(now - before) <= 8.0 / 20.0 + EXACT);
       before = now;
     }
@@ -374,7 +358,7 @@ TEST(a_force_fades_in_changes_without_a_leap_and_fades_out)
   CHECK(hap_pointer_force_set(d->session, d->hand, id, &def) == HAP_ERROR_NOT_FOUND);
   for (int i = 0; i <= 21; ++i) {
     desk_wait(d, 1);
-    CHECK_NEAR(state_of(d).wrench.force[0], fmin(-4.0 + 0.2 * i, 0.0), EXACT);
+    CHECK_NEAR(desk_state(d).wrench.force[0], fmin(-4.0 + 0.2 * i, 0.0), EXACT);
   }
 }
 
@@ -390,26 +374,26 @@ TEST(forces_are_there_before_the_start_and_after_a_stop)
   for (int k = 0; k < 2; ++k) {
     session_run(d->session);
     desk_wait(d, 50);
-    CHECK_NEAR(state_of(d).wrench.force[1], 1.0, EXACT);
+    CHECK_NEAR(desk_state(d).wrench.force[1], 1.0, EXACT);
     CHECK(hap_session_stop(d->session) == HAP_OK);
   }
 }
 
 TEST(no_force_acts_under_a_fault)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_CONSTANT);
   def.force[1] = 3.0;
   hap_force_id id = force_add(d, &def);
   desk_wait(d, 40);
   hap_emergency_zero();
   desk_wait(d, 300);
-  check_vector(state_of(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
+  check_vector(desk_state(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
   CHECK(hap_session_reset_fault(d->session) == HAP_OK);
   double before = 0.0;
   for (int i = 0; i < 40; ++i) {
     desk_wait(d, 1);
-    double now = state_of(d).wrench.force[1];
+    double now = desk_state(d).wrench.force[1];
     CHECK(now - before <= 3.0 / 20.0 + EXACT);
     before = now;
   }
@@ -420,14 +404,14 @@ TEST(no_force_acts_under_a_fault)
   desk_wait(d, 10);
   CHECK(hap_session_reset_fault(d->session) == HAP_OK);
   desk_wait(d, 40);
-  check_vector(state_of(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
+  check_vector(desk_state(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
 }
 
 /* ---- promises ---- */
 
 TEST(a_force_keeps_the_largest_force_that_it_promises)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_SPRING);
   def.stiffness = 1000.0;
   def.max_force = 2.5;
@@ -440,7 +424,7 @@ TEST(the_power_of_a_force_is_bounded_and_no_medium_gives_any)
 {
   const double speed = 3.0;
   for (int gives = 0; gives < 2; ++gives) {
-    desk *d = air_desk(-1.0, 0.0, 0.0);
+    desk *d = desk_in_air(-1.0, 0.0, 0.0);
     hap_force_def def = force_of(HAP_FORCE_CONSTANT);
     double joules = 0.0;
     def.force[0] = gives ? 2.0 : -2.0;
@@ -448,20 +432,20 @@ TEST(the_power_of_a_force_is_bounded_and_no_medium_gives_any)
     (void)force_add(d, &def);
     desk_wait(d, 20);
     for (int i = 0; i < 500; ++i) {
-      joules += speed * T * state_of(d).wrench.force[0];
+      joules += speed * T * desk_state(d).wrench.force[0];
       (void)felt_at(d, HERE(-1.0 + speed * T * i, 0.0, 0.0), HERE(speed, 0.0, 0.0));
     }
     if (gives) {
       CHECK(joules <= 0.5 * (0.5 + 0.1) + 0.02 && joules > 0.25);
-      CHECK((state_of(d).guard & HAP_GUARD_OWN) != 0);
+      CHECK((desk_state(d).guard & HAP_GUARD_OWN) != 0);
     } else { /* what resists a hand is not bounded */
       CHECK_NEAR(joules, -2.0 * speed * 0.5, 0.05);
-      CHECK(state_of(d).guard == 0);
+      CHECK(desk_state(d).guard == 0);
     }
     tap_release(d);
   }
   /* A velocity that is a tick old, of a hand that shakes as fast as it can. */
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def medium = force_of(HAP_FORCE_VISCOUS);
   double joules = 0.0;
   double most = 0.0;
@@ -472,7 +456,7 @@ TEST(the_power_of_a_force_is_bounded_and_no_medium_gives_any)
   for (int i = 0; i < 1000; ++i) {
     double before = at;
     at = 0.0002 * sin(2.0 * M_PI * 200.0 * i * T + 0.3);
-    joules += state_of(d).wrench.force[0] * (at - before);
+    joules += desk_state(d).wrench.force[0] * (at - before);
     most = fmax(joules, most);
     double old = 0.0002 * 2.0 * M_PI * 200.0 * cos(2.0 * M_PI * 200.0 * (i - 1) * T + 0.3);
     (void)felt_at(d, HERE(at, 0.0, 0.0), HERE(old, 0.0, 0.0));
@@ -545,7 +529,7 @@ static const wrong_row wrong[] = {
 
 TEST_EACH(wrong, const wrong_row *row)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_id id = {7};
   hap_force_def def = force_of(HAP_FORCE_VIBRATION);
   row->spoil(&def);
@@ -556,7 +540,7 @@ TEST_EACH(wrong, const wrong_row *row)
 
 TEST(places_ids_and_wrong_calls)
 {
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_CONSTANT);
   hap_force_def raw;
   hap_force_id ids[HAP_FORCES_MAX];
@@ -569,13 +553,13 @@ TEST(places_ids_and_wrong_calls)
   }
   CHECK(hap_pointer_force_add(d->session, d->hand, &def, &other) == HAP_ERROR_CAPACITY);
   desk_wait(d, 5);
-  CHECK_NEAR(state_of(d).wrench.force[0], 1.6, EXACT);
+  CHECK_NEAR(desk_state(d).wrench.force[0], 1.6, EXACT);
   CHECK(hap_pointer_force_remove(d->session, d->hand, ids[3]) == HAP_OK);
   other = force_add(d, &def);
   CHECK(other.v != ids[3].v);
   CHECK(hap_pointer_force_remove(d->session, d->hand, ids[3]) == HAP_ERROR_NOT_FOUND);
   desk_wait(d, 30);
-  CHECK_NEAR(state_of(d).wrench.force[0], 1.6, EXACT);
+  CHECK_NEAR(desk_state(d).wrench.force[0], 1.6, EXACT);
   CHECK(hap_pointer_force_set(d->session, d->hand, none, &def) == HAP_ERROR_NOT_FOUND);
   CHECK(hap_pointer_force_add(d->session, d->hand, NULL, &other) == HAP_ERROR_ARGUMENT);
   CHECK(hap_pointer_force_add(d->session, d->hand, &def, NULL) == HAP_ERROR_ARGUMENT);
@@ -587,7 +571,7 @@ TEST(places_ids_and_wrong_calls)
   REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
   hand_lead(d);
   desk_wait(d, 30); /* another pointer has none of them */
-  check_vector(state_of(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
+  check_vector(desk_state(d).wrench.force, 0.0, 0.0, 0.0, 0.0);
   for (int kind = 1; kind <= 8; ++kind) {
     CHECK(hap_force_kind_name((hap_force_kind)kind) != NULL);
   }
@@ -597,7 +581,7 @@ TEST(places_ids_and_wrong_calls)
 TEST(waves_that_are_replaced_give_their_memory_back)
 {
   float wave[HAP_FORCE_SAMPLES_MAX] = {0.0f};
-  desk *d = air_desk(0.0, 0.0, 0.0);
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
   hap_force_def def = force_of(HAP_FORCE_VIBRATION);
   def.strength = 1.0;
   def.vibration.samples = wave;
@@ -642,6 +626,43 @@ TEST(what_a_device_cannot_hold_is_cut_and_said)
   hap_device_close(device);
 }
 
+/* The device stands 0.25 mm from the target, and holds 2 kN/m. */
+static void steep_check(const hap_force_def *def, double expected, const char *word)
+{
+  hap_detail why = {""};
+  hap_force_id id = {0};
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  hap_device *device = NULL;
+  REQUIRE(hap_device_open("virtual:path=0:0.00025/0/0;9:0.00025/0/0,rated_stiffness=2000", &device,
+                          &why) >= HAP_OK);
+  d->hand_def.device = device;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  session_run(d->session);
+  CHECK(hap_pointer_force_add(d->session, d->hand, def, &id) == HAP_SATURATED);
+  detail_has(d, word);
+  REQUIRE(hap_session_advance(d->session, 60) >= HAP_OK);
+  CHECK_NEAR(desk_state(d).own.force[0], expected, EXACT);
+  hap_session_destroy(d->session);
+  d->session = NULL;
+  hap_device_close(device);
+}
+
+/* On a way of a millimetre, 5 N is as steep as a spring that no device holds. */
+TEST(magnets_and_detents_are_as_steep_as_the_device_holds)
+{
+  hap_force_def detents = force_of(HAP_FORCE_DETENTS);
+  detents.axis[0] = 1.0, detents.axis[2] = 0.0;
+  detents.strength = 5.0;
+  detents.pitch = 1e-3;
+  steep_check(&detents, -2000.0 * detents.pitch / (2.0 * M_PI), "strength 5");
+  hap_force_def magnet = force_of(HAP_FORCE_MAGNET);
+  magnet.strength = 5.0;
+  magnet.range = 1e-3;
+  const double u = 0.25; /* 2 kN/m in the middle, less farther out: docs/forces.md */
+  steep_check(&magnet, -2000.0 * 0.25e-3 * (1.0 - u * u), "strength 5");
+}
+
 TEST(a_spring_on_a_device_without_figures_is_as_stiff_as_contacts)
 {
   hap_detail why = {""};
@@ -660,7 +681,7 @@ TEST(a_spring_on_a_device_without_figures_is_as_stiff_as_contacts)
   CHECK(hap_pointer_force_set(d->session, d->hand, id, &spring) == HAP_SATURATED);
   detail_has(d, "1000");
   REQUIRE(hap_session_advance(d->session, 60) >= HAP_OK);
-  CHECK_NEAR(state_of(d).wrench.force[0], -0.004 * STIFFNESS, EXACT);
+  CHECK_NEAR(desk_state(d).wrench.force[0], -0.004 * STIFFNESS, EXACT);
   hap_session_destroy(d->session);
   d->session = NULL;
   hap_device_close(device);
@@ -706,7 +727,7 @@ TEST(a_replay_has_the_same_forces)
   session_run(d->session);
   forced_session(d);
   CHECK(hap_session_stop(d->session) == HAP_OK);
-  hap_pointer_state last = state_of(d);
+  hap_pointer_state last = desk_state(d);
   hap_pointer_id hand = d->hand;
   tap_release(d);
 

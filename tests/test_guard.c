@@ -679,6 +679,22 @@ TEST(a_wall_with_a_damper_is_left_alone)
   CHECK(f.tick.guard.energy_ticks == 0 && kept.peak > 9.0);
 }
 
+/* Against x, at a speed [m/s]. */
+static void body_comes(double mass, double from, double speed)
+{
+  hapi_model_body *body = add_body(0);
+  body->flags = HAPI_BODY_OWNED;
+  body->mass = mass;
+  for (int i = 0; i < 3; ++i) {
+    body->inertia[4 * i] = 1e-3;
+    body->inverse_inertia[4 * i] = 1e3;
+  }
+  body->linear_keep = body->angular_keep = 1.0;
+  body->max_angular_speed = HUGE_VAL;
+  body->pose.position[0] = from;
+  body->twist.linear[0] = -speed;
+}
+
 /* A body of 1 kg comes at 0.5 m/s, at a hand of 0.3 kg on a spring of hand_k [N/m]; 0: at rest. The
  * largest sum of what the hand has gained and the body still has goes to *out_total. */
 static double wall_impact(hap_guard mode, double hand_k, double *out_total)
@@ -691,17 +707,7 @@ static double wall_impact(hap_guard mode, double hand_k, double *out_total)
   hapi_v3_set(p->device.pose.position, 0.0, 0.0, 0.0);
   f.model->model = HAP_MODEL_CONTACT;
   begin_model();
-  hapi_model_body *body = add_body(0);
-  body->flags = HAPI_BODY_OWNED;
-  body->mass = 1.0;
-  for (int i = 0; i < 3; ++i) {
-    body->inertia[4 * i] = 1e-3;
-    body->inverse_inertia[4 * i] = 1e3;
-  }
-  body->linear_keep = body->angular_keep = 1.0;
-  body->max_angular_speed = HUGE_VAL;
-  body->pose.position[0] = 0.06;
-  body->twist.linear[0] = -0.5;
+  body_comes(1.0, 0.06, 0.5);
   hapi_model_contact *c = add_contact(0, 0, 0);
   c->point_body[0] = -0.02;
   model_adopt();
@@ -759,17 +765,7 @@ static double fast_impact(hap_guard mode, double stiffness, double speed, bool o
   f.model->model = HAP_MODEL_CONTACT;
   begin_model();
   if (of_body) {
-    hapi_model_body *body = add_body(0);
-    body->flags = HAPI_BODY_OWNED;
-    body->mass = 0.2;
-    for (int i = 0; i < 3; ++i) {
-      body->inertia[4 * i] = 1e-3;
-      body->inverse_inertia[4 * i] = 1e3;
-    }
-    body->linear_keep = body->angular_keep = 1.0;
-    body->max_angular_speed = HUGE_VAL;
-    body->pose.position[0] = 0.0603;
-    body->twist.linear[0] = -speed;
+    body_comes(0.2, 0.0603, speed);
   }
   hapi_model_contact *c = add_contact(0, of_body ? 0 : HAPI_SLOT_NONE, 0);
   c->point_body[0] = of_body ? -0.02 : 0.0;

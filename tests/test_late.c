@@ -415,6 +415,80 @@ TEST(a_force_that_the_energy_observer_takes_is_not_held_up_by_a_gap_and_comes_ba
   CHECK_NEAR(p->device.wrench.force[0], -4.0, 1e-9);
 }
 
+TEST(what_the_energy_observer_gives_back_under_less_force_comes_slowly)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  ticks_miss(7);
+  ticks_run(155); /* the gap's own limit is long over, and most of the force is back */
+  CHECK(p->guard.late_loss > 0.05 && p->guard.late_loss < 0.2);
+  f.tick.guard.balance = -1.0;
+  p->device.pose.position[0] -= 5e-4;
+  ticks_run(1);
+  CHECK((p->guard.flags & HAP_GUARD_ENERGY) != 0);
+  CHECK_NEAR(p->device.wrench.force[0], 0.0, 1e-9);
+  f.tick.guard.balance = 1.0;
+  ticks_run(1);
+  CHECK_NEAR(p->device.wrench.force[0], -LIMIT / 12.5, 1e-9);
+}
+
+/* ---- the closed forms of the bench ---- */
+
+/* A hand against a wall whose spring falls to 1 / n of its force and stiffness, step by step. */
+static double swing_stepped(const late_hand *hand, const late_touch *touch, double force, double n)
+{
+  const double step = 1e-6;
+  double x = 0.0; /* m, farther in */
+  double v = 0.0;
+  double most = force / n;
+  for (int i = 0; i < 200000; ++i) {
+    double pressed = force / n + touch->stiffness / n * x;
+    double a = force - hand->stiffness * x - hand->damping * v - pressed - touch->damping / n * v;
+    v += step * a / hand->mass;
+    x += step * v;
+    most = fmax(most, pressed);
+  }
+  return most;
+}
+
+/* A hand that is pressed, with no more force, meets a wall at a speed. */
+static double blow_stepped(const late_hand *hand, const late_touch *touch, double speed)
+{
+  const double step = 1e-6;
+  double x = 0.0;
+  double v = speed;
+  double most = 0.0;
+  for (int i = 0; i < 200000; ++i) {
+    double k = touch->stiffness + hand->stiffness;
+    v -= step * (k * x + (hand->damping + touch->damping) * v) / hand->mass;
+    x += step * v;
+    most = fmax(most, touch->stiffness * x);
+  }
+  return most;
+}
+
+TEST(what_pulses_demand_is_what_a_stepped_hand_gives)
+{
+  static const char *const specs[] = {"virtual:hand=relaxed", "virtual:hand=tense"};
+  const late_touch touch = {2000.0, 5.0};
+  for (int i = 0; i < 2; ++i) {
+    const late_hand hand = late_hand_of(specs[i]);
+    double swing = 0.0;
+    CHECK(hand.known && !hand.prescribed);
+    for (int n = 2; n <= 3; ++n) {
+      swing = fmax(swing, swing_stepped(&hand, &touch, 5.0, n));
+      CHECK_NEAR(late_demands(&hand, &touch, 5.0, 0.0, n), fmax(swing, 5.0), 2e-3);
+      double u = 0.1 * (1.0 - 1.0 / n);
+      double more = fmax(blow_stepped(&hand, &touch, u), 2000.0 * 0.1 * 1e-3 * (n - 1));
+      double both = fmax(swing / 5.0, 1.0) * (5.0 + more);
+      CHECK_NEAR(late_demands(&hand, &touch, 5.0, 0.1, n), both, 3e-3);
+    }
+  }
+  const late_hand rigid = late_hand_of("virtual:hand=rigid");
+  CHECK_NEAR(late_demands(&rigid, &touch, 5.0, 0.1, 4), 5.0 + 2000.0 * 0.1 * 3e-3, 1e-12);
+  CHECK_NEAR(late_demands(&rigid, &touch, 5.0, 0.1, 31), 5.0 + 2000.0 * 0.1 * 5e-3, 1e-12);
+  CHECK(!late_hand_of("virtual:hand=relaxed,mass=1").known && !late_hand_of(NULL).known);
+}
+
 TEST(where_nobody_watches_what_a_gap_held_back_comes_in_unpaid)
 {
   hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);

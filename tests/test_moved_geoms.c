@@ -18,6 +18,7 @@
 #define THICK 0.02
 #define SPEED 0.06  /* m/s */
 #define SWING 0.033 /* m */
+#define LATER 0.5   /* s */
 
 typedef enum thing_kind {
   THING_BOX,
@@ -46,7 +47,8 @@ typedef struct moved {
   double middle[3]; /* m, of the geom, below the upper side */
   dQuaternion stands;
   way_fn way;
-  double time; /* s, of the world */
+  double time;  /* s, of the world */
+  dBodyID lost; /* destroyed without a word as the geom begins to move; NULL: none */
   double points[3 * CORNERS];
   double planes[24];
   dTriMeshDataID mesh;
@@ -135,10 +137,52 @@ static void moved_put(moved *m, double time)
   dGeomSetQuaternion(m->geom, all);
 }
 
+/* A heap that gives the block of one body to the next block of its size. */
+static struct {
+  void *watched; /* NULL: none */
+  void *free;
+  size_t size;
+  int taken;
+} heap;
+
+static void *heap_alloc(dsizeint size)
+{
+  void *block = heap.free;
+  if (block == NULL || size != heap.size) {
+    return malloc(size);
+  }
+  heap.free = NULL;
+  ++heap.taken;
+  return block;
+}
+
+static void *heap_realloc(void *block, dsizeint old_size, dsizeint size)
+{
+  (void)old_size;
+  return realloc(block, size);
+}
+
+static void heap_free(void *block, dsizeint size)
+{
+  if (block == NULL || block != heap.watched) {
+    free(block);
+    return;
+  }
+  heap.watched = NULL;
+  heap.free = block;
+  heap.size = size;
+}
+
 static void moved_step(void *user, double step_s)
 {
   moved *m = user;
   m->time += step_s;
+  if (m->lost != NULL && m->time > LATER) {
+    dGeomDestroy(dBodyGetFirstGeom(m->lost));
+    heap.watched = m->lost;
+    dBodyDestroy(m->lost);
+    m->lost = NULL;
+  }
   if (m->geom != NULL || m->body != NULL) {
     moved_put(m, m->time);
   }
@@ -159,6 +203,7 @@ typedef struct moved_case {
   bool has_body;
   bool hull; /* the hand is a cube as high and wide as the ball would be */
   bool in_space;
+  bool loses; /* a body, as the geom begins to move */
   double friction;
 } moved_case;
 
@@ -192,6 +237,7 @@ static moved *moved_open(const moved_case *c)
     m->w.hand_def.hull_xyz = hull;
     m->w.hand_def.hull_points = CORNERS;
   }
+  m->lost = c->loses ? cw_add_cube(&m->w, 0.1, 0.02, 1.0, 0.0, 0.0) : NULL;
   moved_put(m, 0.0);
   return m;
 }
@@ -211,17 +257,17 @@ static void way_swing(double time, thing_place *out)
 /* At rest, then as above. */
 static void way_up_later(double time, thing_place *out)
 {
-  way_up(fmax(time - 0.5, 0.0), out);
+  way_up(fmax(time - LATER, 0.0), out);
 }
 
 static void way_tilt(double time, thing_place *out)
 {
-  out->turn[1] = -0.05 * sin(TURN * fmax(time - 0.5, 0.0));
+  out->turn[1] = -0.05 * sin(TURN * fmax(time - LATER, 0.0));
 }
 
 static void way_along(double time, thing_place *out)
 {
-  out->position[0] = SPEED * fmax(time - 0.5, 0.0);
+  out->position[0] = SPEED * fmax(time - LATER, 0.0);
 }
 
 /* Up, and then it stands. */
@@ -251,10 +297,11 @@ static void moved_feel(const moved_case *c, felt *out)
     c->way(1e-3 * k, &there);
     m->w.hand_at[2] = there.position[2] + RADIUS - 0.003;
     cw_put_hand(&m->w, 0.0, 0.0, 0.0);
-    CHECK(hap_session_advance(m->w.session, 1) == HAP_OK);
+    CHECK(hap_session_advance(m->w.session, 1) >= HAP_OK);
     cw_read(&m->w);
     memcpy(out->force[k], m->w.force, sizeof m->w.force);
   }
+  CHECK(cw_stats(&m->w).faults.bodies_lost == (c->loses ? 1 : 0));
 }
 
 static double felt_apart(const felt *a, const felt *b, int from)
@@ -403,6 +450,20 @@ TEST(a_fast_geom_arrives_in_time)
     }
     CHECK(m->w.force[2] > 2.0);
   }
+}
+
+/* The session's own body of a geom may come to be where the application's body was. */
+TEST(a_geom_that_moves_as_a_body_is_lost_is_felt_as_a_body_is)
+{
+  moved_case c = {.hz = 60.0, .model = HAP_MODEL_CONTACT, .way = way_up_later, .loses = true};
+  dSetAllocHandler(heap_alloc);
+  dSetReallocHandler(heap_realloc);
+  dSetFreeHandler(heap_free);
+  same_as_body(&c, 0);
+  CHECK(heap.taken == 1);
+  dSetAllocHandler(NULL);
+  dSetReallocHandler(NULL);
+  dSetFreeHandler(NULL);
 }
 
 /* A load that the loop owns is lifted and carried along. */

@@ -425,6 +425,30 @@ TEST(two_devices_are_two_pointers)
   CHECK_NEAR(second_x, 0.1, 1e-3);
 }
 
+/* The second end effector is 10 mm beside the first: where the scene has two hands it is a pointer,
+ * in the device's frame, which begins where the scene's first hand does. */
+TEST(end_effectors_of_a_device_are_pointers_as_far_as_the_scene_has_hands)
+{
+  char head[8000] = "";
+  const char *module = folder_module("HAPODE_BROKEN");
+  REQUIRE(run("--scene grasp --lockstep --seconds 0.1 --device module:%s,break=two_effectors "
+              "--trace %s",
+              module, folder_path("fingers.csv")) == 0);
+  CHECK(strstr(ran.out, "effectors_left") == NULL);
+  FILE *file = fopen(folder_path("fingers.csv"), "r");
+  REQUIRE(file != NULL);
+  CHECK(fgets(head, sizeof head, file) != NULL);
+  CHECK(strstr(head, ",p1_x,") != NULL && strstr(head, ",p2_x,") == NULL);
+  fclose(file);
+  REQUIRE(run("--scene slide --lockstep --seconds 0.1 --device module:%s,break=two_effectors",
+              module) == 0);
+  CHECK(strstr(ran.out, "\neffectors_left: 1 (") != NULL);
+  REQUIRE(run("--scene grasp --lockstep --seconds 0.1 --device module:%s,break=two_effectors "
+              "--device virtual",
+              module) == 0);
+  CHECK(strstr(ran.out, "\neffectors_left: 1 (") != NULL);
+}
+
 TEST(lockstep_is_the_same_every_time)
 {
   char first[64];

@@ -9,6 +9,7 @@
 
 #include <hapode/hooks.h>
 
+#include "bench/oscillation.h"
 #include "session/session_internal.h"
 #include "tests/contact_world.h"
 #include "tests/stage.h"
@@ -19,6 +20,7 @@
 static atomic_int late_lines;
 static atomic_int unsolved_lines;
 static atomic_int derated_lines;
+static atomic_int swing_lines;
 
 static void count_lines(hap_log_level level, const char *text, void *user)
 {
@@ -26,6 +28,7 @@ static void count_lines(hap_log_level level, const char *text, void *user)
   if (level >= HAP_LOG_WARNING) {
     atomic_fetch_add(&late_lines, strstr(text, "takes longer than its period") != NULL);
     atomic_fetch_add(&derated_lines, strstr(text, "haptic loop come late") != NULL);
+    atomic_fetch_add(&swing_lines, strstr(text, "swings by itself") != NULL);
     atomic_fetch_add(&unsolved_lines, strstr(text, "than a tick can solve") != NULL);
   }
 }
@@ -38,6 +41,7 @@ static void count_begin(void)
   atomic_store(&late_lines, 0);
   atomic_store(&unsolved_lines, 0);
   atomic_store(&derated_lines, 0);
+  atomic_store(&swing_lines, 0);
   CHECK(hap_hooks_set(&hooks) == HAP_OK);
 }
 
@@ -113,4 +117,29 @@ TEST(late_ticks_are_said_once)
 {
   CHECK(lines_of_gaps(10) == 1);
   CHECK(lines_of_gaps(0) == 0);
+}
+
+/* A device of 0.3 kg on a wall, whose force comes late by a delay. */
+static int lines_of_delay(double delay_s)
+{
+  static osc_result result;
+  osc_def def;
+  hap_detail why;
+  osc_init(&def);
+  def.plant =
+      (osc_plant){.mass = 0.3, .hand_stiffness = 150.0, .hand_damping = 3.0, .delay_s = delay_s};
+  def.amplitude = 0.03;
+  def.seconds = 2.0;
+  def.stiffness = 1300.0;
+  count_begin();
+  CHECK(osc_run(&def, &result, &why) >= HAP_OK);
+  CHECK(hap_hooks_set(NULL) == HAP_OK);
+  CHECK((result.derated > 0) == (delay_s > 0.0));
+  return atomic_load(&swing_lines);
+}
+
+TEST(a_device_that_swings_is_said_once)
+{
+  CHECK(lines_of_delay(0.0045) == 1);
+  CHECK(lines_of_delay(0.0) == 0);
 }

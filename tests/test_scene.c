@@ -327,6 +327,33 @@ TEST(a_pendulum_swings_at_its_period)
   scene_end(scene, session);
 }
 
+/* A weight hangs on a joint until the joint is gone; then it falls. */
+TEST(a_joint_that_is_removed_holds_nothing)
+{
+  hap_scene *scene = scene_new(9.81);
+  hap_geom_def ball = geom_of(HAP_SHAPE_SPHERE);
+  uint32_t body = body_add(scene, &ball, 1, (double[3]){0.0, 0.0, 1.0});
+  hap_joint_def def;
+  uint32_t joint = 9;
+  hap_joint_def_init(&def, sizeof def);
+  def.kind = HAP_JOINT_FIXED;
+  def.body_a = body;
+  REQUIRE(hap_scene_add_joint(scene, &def, &joint, NULL) == HAP_OK);
+  hap_session_def session_def;
+  hap_session *session = NULL;
+  hap_session_def_init(&session_def, sizeof session_def);
+  session_def.drive = HAP_DRIVE_LOCKSTEP;
+  REQUIRE(hap_scene_session(scene, &session_def, &session, NULL) == HAP_OK);
+  CHECK(hap_session_start(session) >= HAP_OK);
+  CHECK(hap_session_advance(session, 200) == HAP_OK);
+  CHECK_NEAR(body_at(scene, body).pose.position[2], 1.0, 1e-3);
+  CHECK(hap_scene_remove_joint(scene, joint) == HAP_OK);
+  CHECK(hap_scene_remove_joint(scene, joint) == HAP_ERROR_NOT_FOUND);
+  CHECK(hap_session_advance(session, 300) == HAP_OK);
+  CHECK_NEAR(body_at(scene, body).pose.position[2], 1.0 - 0.5 * 9.81 * 0.09, 0.05);
+  scene_end(scene, session);
+}
+
 TEST(every_kind_of_joint_has_its_axes_stops_and_motor)
 {
   static const struct {

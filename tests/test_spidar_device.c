@@ -314,6 +314,24 @@ TEST(a_gap_between_reads_is_no_doubt)
   CHECK_SAY(moved > 0.2 && far < 1e-3, "%g m/s, %g mm off", moved, 1e3 * far);
 }
 
+/* The loop's own jitter is no gap: from 2 ms on the pose is carried on by as much. */
+TEST(a_read_that_is_late_by_2_ms_is_carried_on)
+{
+  static const int64_t late_ns[] = {0, 1900000, 2100000, 6000000, 21000000};
+  static const double carried_s[] = {0.0, 0.0, 2.1e-3, 6e-3, 0.0}; /* from 20 ms on it is rest */
+  for (int i = 0; i < 5; ++i) {
+    rig *r = rig_start();
+    for (int k = 0; k < 20; ++k) {
+      CHECK(rig_read(r) == HAP_OK && r->device->reads.late == 0.0);
+      CHECK(rig_write(r, 0.0) == HAP_OK);
+    }
+    r->time_ns += late_ns[i];
+    CHECK(rig_read(r) == HAP_OK);
+    CHECK_NEAR(r->device->reads.late, carried_s[i], 1e-9);
+    tap_release(r);
+  }
+}
+
 /* 10 bits a byte of 2 Mbit/s, and a tick. */
 TEST(the_delay_is_that_of_the_commands)
 {

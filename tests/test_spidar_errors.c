@@ -162,6 +162,44 @@ ssize_t write(int fd, const void *bytes, size_t size)
   return sent;
 }
 
+/* The clock, and sleep, of who waits for another writer. */
+static struct waiting {
+  int64_t step_ns; /* of each look at the clock; 0: the real one */
+  int64_t now_ns;
+  int looks;
+  int pauses;
+  int64_t asleep_ns;
+  void (*hook)(void); /* in each pause */
+} waiting;
+
+int clock_gettime(clockid_t clock, struct timespec *out)
+{
+  int (*real)(clockid_t, struct timespec *);
+  REAL(real, "clock_gettime");
+  if (waiting.step_ns == 0) {
+    return real(clock, out);
+  }
+  ++waiting.looks;
+  waiting.now_ns += waiting.step_ns;
+  *out = (struct timespec){waiting.now_ns / 1000000000, waiting.now_ns % 1000000000};
+  return 0;
+}
+
+int nanosleep(const struct timespec *length, struct timespec *left)
+{
+  int (*real)(const struct timespec *, struct timespec *);
+  REAL(real, "nanosleep");
+  if (waiting.step_ns == 0) {
+    return real(length, left);
+  }
+  ++waiting.pauses;
+  waiting.asleep_ns += 1000000000 * length->tv_sec + length->tv_nsec;
+  if (waiting.hook != NULL) {
+    waiting.hook();
+  }
+  return 0;
+}
+
 static int locks_tried;
 
 int flock(int fd, int operation)
@@ -637,6 +675,45 @@ TEST(zeros_are_tried_again_and_leave_errno_as_it_was)
   /* Within 1 ms, as it may be a signal handler; a write that is refused takes a us. */
   int tries = 1000000 - fails[CALL_WRITE].times;
   CHECK_SAY(tries >= 50 && tries <= 1000 && errno == ERANGE, "%d tries", tries);
+}
+
+static hapi_spidar_serial *written_to;
+
+static void writer_leaves_in_the_third_pause(void)
+{
+  if (waiting.pauses == 3) {
+    atomic_store(&written_to->writer, 0);
+  }
+}
+
+/* While another thread writes: from when on, and whether, it lets go. */
+static unsigned zeros_wait(rig *r, void (*hook)(void))
+{
+  unsigned cuts = atomic_load(&r->serial.cuts);
+  written_to = &r->serial;
+  atomic_store(&r->serial.writer, 1); /* no thread has this name */
+  waiting = (struct waiting){.step_ns = 100, .hook = hook};
+  CHECK(hapi_spidar_serial_force(&r->serial, none_bytes, NONE_SIZE));
+  waiting.step_ns = 0;
+  CHECK(atomic_load(&r->serial.writer) == (waiting.pauses == 3 ? 0 : 1)); /* who had it has it */
+  atomic_store(&r->serial.writer, 0);
+  return atomic_load(&r->serial.cuts) - cuts;
+}
+
+/* A write is over in some us, and a thread that lost the processor is back in some 0.1 ms, if the
+ * caller sleeps. Zeros that come ms later would be late for whoever stopped a driver that hangs. */
+TEST(zeros_wait_for_another_writer_but_not_for_long)
+{
+  rig *r = rig_open();
+  CHECK(zeros_wait(r, NULL) == 2); /* beside it */
+  CHECK_SAY(waiting.looks >= 70 && waiting.looks <= 700, "%d looks", waiting.looks);
+  CHECK_SAY(waiting.asleep_ns >= 500000 && waiting.asleep_ns <= 5000000, "%g ms asleep",
+            1e-6 * (double)waiting.asleep_ns);
+  CHECK(waiting.asleep_ns <= 200000 * waiting.pauses);
+  CHECK(zeros_wait(r, writer_leaves_in_the_third_pause) == 0 && waiting.pauses == 3);
+  atomic_store(&r->serial.forcing, 1); /* other zeros wait: these need not */
+  CHECK(zeros_wait(r, NULL) == 2 && waiting.pauses == 0 && waiting.looks > 0);
+  atomic_store(&r->serial.forcing, 0);
 }
 
 /* ---- which ports there are ---- */

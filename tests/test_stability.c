@@ -9,6 +9,7 @@
 #include <ode/ode.h>
 
 #include "bench/stability.h"
+#include "bench/stability_own.h"
 
 #define SECONDS 1.5
 
@@ -123,4 +124,50 @@ TEST(many_light_cubes_are_all_felt)
     printf("# 64 cubes of %g kg: %.4f of %.4f N/m\n", masses[i], felt, expected);
     CHECK_NEAR(felt, expected, 0.01 * expected);
   }
+}
+
+/* A sample of the map of own forces, textures and grabs: the steepest, the lightest, the latest. */
+TEST(fields_textures_and_grabs_make_no_energy)
+{
+  int cut = 0;
+  for (int field = 0; field < OWN_FIELDS; ++field) {
+    for (int i = 0; i < 24; ++i) {
+      const own_point p = {.field = (own_field)field,
+                           .coupling = HAP_COUPLING_AUTO,
+                           .stiffness = i % 2 == 0 ? 1e5 : 100.0,
+                           .mass = i / 2 % 3 == 0   ? 0.01
+                                   : i / 2 % 3 == 1 ? 0.3
+                                                    : 10.0,
+                           .haptic_hz = 1000.0,
+                           .delay_ticks = i / 6 % 2 == 0 ? 0.0 : 2.0,
+                           .floored = true,
+                           .hand = i / 12 == 0 ? STABILITY_NONE : STABILITY_RELAXED};
+      own_point bound = p;
+      own_result result;
+      bound.bound = own_field_binds(p.field);
+      REQUIRE(own_run(&unused, &bound, 0.6, &result) >= HAP_OK);
+      CHECK_SAY(result.bounded && result.stable,
+                "%s, %g N/m, %g kg, late by %g, hand %s: ratio %.4f, %.3g N",
+                own_field_word(p.field), p.stiffness, p.mass, p.delay_ticks,
+                stability_hand_word(p.hand), result.energy_ratio, result.force);
+      CHECK(result.refused || result.force > 0.0);
+      cut += result.cut;
+    }
+  }
+  CHECK(cut > 0);
+}
+
+/* So that the points above are not stable whatever is done: a function that hides how steep it is
+ * swings, up to what it promises and no further. */
+TEST(an_untold_spring_swings_within_its_promise)
+{
+  const own_point p = {.field = OWN_UNTOLD,
+                       .coupling = HAP_COUPLING_AUTO,
+                       .stiffness = 1e5,
+                       .mass = 0.3,
+                       .haptic_hz = 1000.0,
+                       .hand = STABILITY_NONE};
+  own_result result;
+  REQUIRE(own_run(&unused, &p, 1.0, &result) >= HAP_OK);
+  CHECK(result.bounded && result.energy_ratio > 1.1);
 }

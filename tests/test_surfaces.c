@@ -9,85 +9,7 @@
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 
-#include "tests/contact_world.h"
-#include "tests/solids.h"
-
-#define RADIUS 0.01
-#define STIFFNESS 1000.0
-#define PERIOD 1e-3
-#define MODELS (sizeof all_models / sizeof all_models[0])
-
-/* ---- what the application says ---- */
-
-static struct {
-  dGeomID other; /* that is left as it came */
-  hap_surface says;
-  hap_surface came; /* the last one */
-  int calls;
-  const contact_world *changes; /* NULL: the callback calls nothing */
-  hap_status status;            /* of its call */
-} told;
-
-static void surface_say(void *user, hap_pointer_id pointer, dGeomID geom, hap_surface *io)
-{
-  (void)user;
-  (void)pointer;
-  ++told.calls;
-  told.came = *io;
-  if (told.changes != NULL) {
-    told.status = hap_session_surface_changed(told.changes->session, geom);
-  }
-  if (geom != told.other) {
-    *io = told.says;
-  }
-}
-
-/* As it comes for the pointers of these tests. */
-static hap_surface surface_plain(void)
-{
-  return (hap_surface){.size = sizeof(hap_surface),
-                       .touchable = 1,
-                       .stiffness = STIFFNESS,
-                       .damping = 0.0,
-                       .friction_static = 0.0,
-                       .friction_dynamic = 0.0};
-}
-
-static void surface_change(contact_world *w, dGeomID geom)
-{
-  CHECK(hap_session_lock(w->session) == HAP_OK);
-  CHECK(hap_session_surface_changed(w->session, geom) == HAP_OK);
-  hap_session_unlock(w->session);
-}
-
-/* A floor that the hand stands 1 mm above. */
-static contact_world *floor_new(hap_model model)
-{
-  memset(&told, 0, sizeof told);
-  told.says = surface_plain();
-  contact_world *w = cw_new(0.0);
-  w->def.model = model;
-  w->def.physics_hz = 100.0;
-  w->hand_def.radius = RADIUS;
-  w->hand_def.stiffness = STIFFNESS;
-  w->hand_def.damping = 0.0;
-  w->ode.pointer_surface = surface_say;
-  return w;
-}
-
-static void floor_start(contact_world *w)
-{
-  cw_start(w, 0.0, 0.0, RADIUS + 0.001);
-  cw_run(w, 30);
-}
-
-/* Down to that depth, and wait. */
-static void hand_press(contact_world *w, double depth)
-{
-  double way = RADIUS - depth - w->hand_at[2];
-  cw_go(w, 0.0, 0.0, way / 0.1, 100);
-  cw_go(w, 0.0, 0.0, 0.0, 60);
-}
+#include "tests/surface_world.h"
 
 /* ---- stiffness and damping ---- */
 
@@ -156,10 +78,7 @@ TEST(the_points_of_a_hull_share_it)
     double corners[8 * 3];
     contact_world *w = floor_new(all_models[m]);
     cw_add_floor(w);
-    box_corners(AT(0.01, 0.01, 0.01), AT(0.0, 0.0, 0.0), corners);
-    w->hand_def.radius = 0.0;
-    w->hand_def.hull_xyz = corners;
-    w->hand_def.hull_points = 8;
+    hand_be_cube(w, corners);
     told.says.stiffness = 300.0;
     floor_start(w);
     hand_press(w, 0.002);
@@ -219,10 +138,7 @@ TEST(a_hull_goes_through_what_is_not_touchable)
     double corners[8 * 3];
     contact_world *w = floor_new(all_models[m]);
     cw_add_floor(w);
-    box_corners(AT(0.01, 0.01, 0.01), AT(0.0, 0.0, 0.0), corners);
-    w->hand_def.radius = 0.0;
-    w->hand_def.hull_xyz = corners;
-    w->hand_def.hull_points = 8;
+    hand_be_cube(w, corners);
     told.says.touchable = 0;
     floor_start(w);
     hand_press(w, 0.002);
@@ -385,10 +301,7 @@ TEST(a_face_holds_more_while_it_sticks)
     double most;
     contact_world *w = floor_new(all_models[m]);
     cw_add_floor(w);
-    box_corners(AT(0.01, 0.01, 0.01), AT(0.0, 0.0, 0.0), corners);
-    w->hand_def.radius = 0.0;
-    w->hand_def.hull_xyz = corners;
-    w->hand_def.hull_points = 8;
+    hand_be_cube(w, corners);
     told.says.friction_static = 0.6;
     told.says.friction_dynamic = 0.2;
     floor_start(w);
@@ -424,10 +337,16 @@ static hap_texture_def wave_def(void)
   return def;
 }
 
-static void texture_use(contact_world *w, const hap_texture_def *def)
+/* Over a floor with the wave, whose hand is 20 mm above it. */
+static contact_world *wave_floor(hap_model model, double haptic_hz, double x)
 {
-  CHECK(hap_session_add_texture(w->session, def, &told.says.texture) == HAP_OK);
-  surface_change(w, NULL);
+  contact_world *w = floor_new(model);
+  cw_add_floor(w);
+  w->def.haptic_hz = haptic_hz;
+  cw_start(w, x, 0.0, RADIUS + 0.02);
+  hap_texture_def def = wave_def();
+  texture_use(w, &def);
+  return w;
 }
 
 typedef struct texture_row {
@@ -447,12 +366,7 @@ TEST_EACH(strokes, const texture_row *row)
 {
   const double depth = 0.001;
   for (size_t m = 0; m < MODELS; ++m) {
-    contact_world *w = floor_new(all_models[m]);
-    cw_add_floor(w);
-    w->def.haptic_hz = row->rate;
-    cw_start(w, 0.0, 0.0, RADIUS + 0.02);
-    hap_texture_def def = wave_def();
-    texture_use(w, &def);
+    contact_world *w = wave_floor(all_models[m], row->rate, 0.0);
     int second = (int)row->rate;
     cw_go(w, 0.0, 0.0, -(0.02 + depth) / 0.5, second / 2);
     cw_go(w, row->speed, 0.0, 0.0, second / 10);
@@ -527,12 +441,7 @@ static double round_work(contact_world *w)
 TEST(no_round_over_a_texture_gives_energy)
 {
   for (size_t m = 0; m < MODELS; ++m) {
-    contact_world *w = floor_new(all_models[m]);
-    cw_add_floor(w);
-    w->def.haptic_hz = 1e4;
-    cw_start(w, -0.125 * WAVE, 0.0, RADIUS + 0.02);
-    hap_texture_def def = wave_def();
-    texture_use(w, &def);
+    contact_world *w = wave_floor(all_models[m], 1e4, -0.125 * WAVE);
     cw_go(w, 0.0, 0.0, -0.0205 / 0.1, 1000);
     double stored = 0.5 * STIFFNESS * 1.6e-3 * 1.6e-3;
     for (int round = 0; round < 3; ++round) {
@@ -585,11 +494,7 @@ TEST(a_texture_that_comes_under_a_load_does_not_leap)
 /* The tops of the wave are felt before the geom is. */
 TEST(what_stands_above_the_geom_is_felt_above_it)
 {
-  contact_world *w = floor_new(HAP_MODEL_CONTACT);
-  cw_add_floor(w);
-  cw_start(w, 0.25 * WAVE, 0.0, RADIUS + 0.02);
-  hap_texture_def def = wave_def();
-  texture_use(w, &def);
+  contact_world *w = wave_floor(HAP_MODEL_CONTACT, 1e3, 0.25 * WAVE);
   cw_go(w, 0.0, 0.0, -0.04 + 0.5 * HEIGHT / 0.5, 500);
   CHECK_NEAR(w->force[2], STIFFNESS * 0.5 * HEIGHT, 1e-5);
   cw_go(w, 0.5 * WAVE / 0.1, 0.0, 0.0, 100);
@@ -832,6 +737,9 @@ static const wrong_row wrongs[] = {
     {"damping_below_0", offsetof(hap_surface, damping), -1e-3},
     {"static_friction_below_0", offsetof(hap_surface, friction_static), -0.1},
     {"dynamic_friction_that_is_not_finite", offsetof(hap_surface, friction_dynamic), (double)NAN},
+    {"adhesion_that_is_not_finite", offsetof(hap_surface, adhesion), (double)NAN},
+    {"adhesion_below_0", offsetof(hap_surface, adhesion), -1e-3},
+    {"adhesion_beyond_all", offsetof(hap_surface, adhesion), 100.1},
 };
 
 TEST_EACH(wrongs, const wrong_row *row)

@@ -196,6 +196,9 @@ static int run_and_report(run_loop *loop, const run_recording *recording)
     if (recording->player == NULL) {
       run_coupling_print(loop->coupling, loop->rig->pointer_count, stdout);
     }
+    if (loop->rig->effectors_left > 0) {
+      printf("effectors_left: %zu (the scene has no more hands)\n", loop->rig->effectors_left);
+    }
     if (loop->options->effects_table) {
       run_effects_table(effects, stdout);
     }

@@ -36,9 +36,10 @@ hap_status rig_find_model(const char *name, hap_model *out, hap_detail *detail)
 }
 
 /* "virtual" without arguments is the hand that belongs to the scene. */
-static const char *device_spec(const rig_options *options, const scene *s, size_t index)
+static const char *device_spec(const rig_options *options, const rig *r, size_t index)
 {
-  const char *own = index < (size_t)s->parameters.pointers ? s->parameters.hands[index] : NULL;
+  const scene_parameters *p = &r->scene->parameters;
+  const char *own = r->pointer_count < (size_t)p->pointers ? p->hands[r->pointer_count] : NULL;
   const char *asked = index < options->device_count ? options->devices[index] : NULL;
   bool scenes_own = asked == NULL || strcmp(asked, "virtual") == 0;
   return scenes_own && own != NULL ? own : asked != NULL ? asked : "virtual";
@@ -80,10 +81,17 @@ static void set_tool(const double edges[3], double out[8][3])
   }
 }
 
+/* What moves a pointer. */
+typedef struct rig_hand {
+  hap_device *device;
+  uint32_t effector;
+  hap_pose pose_world_device;
+} rig_hand;
+
 static hap_status open_device(const rig_options *options, rig *r, size_t index, hap_detail *detail)
 {
   const scene_parameters *p = &r->scene->parameters;
-  const char *spec = device_spec(options, r->scene, index);
+  const char *spec = device_spec(options, r, index);
   if (index == 0 && options->hardware != NULL) {
     return HAP_OK; /* as it is since the begin */
   }
@@ -96,26 +104,17 @@ static hap_status open_device(const rig_options *options, rig *r, size_t index, 
   return hap_device_open(spec, &r->devices[index], detail);
 }
 
-static hap_status add_pointer(const rig_options *options, rig *r, size_t index, hap_detail *detail)
+static hap_status add_pointer(const rig_options *options, rig *r, const rig_hand *hand,
+                              hap_detail *detail)
 {
   const scene_parameters *p = &r->scene->parameters;
   hap_pointer_def def;
   hap_pointer_expert_def expert;
   hap_pointer_research_def research;
   pointer_defs_init(&def, &expert, &research);
-  hap_status status = open_device(options, r, index, detail);
-  if (status >= HAP_OK) {
-    status = take_identity(options->identities[index], r->devices[index], detail);
-  }
-  if (status < HAP_OK) {
-    return status;
-  }
-  def.device = r->devices[index];
-  const char *hand = index < (size_t)p->pointers ? p->hands[index] : NULL;
-  bool hardware = index == 0 && options->hardware != NULL;
-  if (hardware || hapi_device_ops(def.device)->pacing != HAP_PACING_VIRTUAL) {
-    place_device(hand, &def.pose_world_device);
-  }
+  def.device = hand->device;
+  def.effector = hand->effector;
+  def.pose_world_device = hand->pose_world_device;
   double hull[8][3];
   def.radius = p->radius;
   if (p->tool[0] > 0.0) {
@@ -136,11 +135,40 @@ static hap_status add_pointer(const rig_options *options, rig *r, size_t index, 
   research.integration = options->integration;
   research.virtual_mass =
       options->virtual_mass > 0.0 ? options->virtual_mass : research.virtual_mass;
-  status = hap_pointer_add(r->session, &def, &r->pointers[index]);
+  hap_status status = hap_pointer_add(r->session, &def, &r->pointers[r->pointer_count]);
   if (status < HAP_OK) {
     (void)hap_session_detail(r->session, detail);
+    return status;
   }
-  return status;
+  ++r->pointer_count;
+  return HAP_OK;
+}
+
+/* All end effectors of a device are in its frame, which is put where the hand of the first one
+ * begins. */
+static hap_status add_device(const rig_options *options, rig *r, size_t index, hap_detail *detail)
+{
+  const scene_parameters *p = &r->scene->parameters;
+  const size_t own = (size_t)p->pointers;
+  hap_device_info info;
+  HAPI_TRY(open_device(options, r, index, detail));
+  rig_hand hand = {.device = r->devices[index], .pose_world_device = {.quat_wxyz = {1.0}}};
+  HAPI_TRY(take_identity(options->identities[index], hand.device, detail));
+  bool hardware = index == 0 && options->hardware != NULL;
+  if (hardware || hapi_device_ops(hand.device)->pacing != HAP_PACING_VIRTUAL) {
+    place_device(r->pointer_count < own ? p->hands[r->pointer_count] : NULL,
+                 &hand.pose_world_device);
+  }
+  HAPI_TRY(hap_device_get_info(hand.device, &info, sizeof info));
+  HAPI_TRY(add_pointer(options, r, &hand, detail));
+  while (++hand.effector < info.effector_count) {
+    if (r->pointer_count + (r->device_count - index - 1) < own) {
+      HAPI_TRY(add_pointer(options, r, &hand, detail));
+    } else {
+      ++r->effectors_left;
+    }
+  }
+  return HAP_OK;
 }
 
 static hap_status create_session(const rig_options *options, rig *r, hap_detail *detail)
@@ -160,8 +188,10 @@ static hap_status create_session(const rig_options *options, rig *r, hap_detail 
   if (options->player != NULL) {
     (void)hap_player_get_def(options->player, &def, &expert, &research);
   }
-  if (def.max_pointers < (int32_t)r->pointer_count) {
-    def.max_pointers = (int32_t)r->pointer_count;
+  int32_t own = r->device_count > 0 ? r->scene->parameters.pointers : 0;
+  int32_t hands = own > (int32_t)r->device_count ? own : (int32_t)r->device_count;
+  if (def.max_pointers < hands) {
+    def.max_pointers = hands;
   }
   hap_status status = hap_session_create(&def, &ode, &r->session, detail);
   if (status < HAP_OK) {
@@ -194,13 +224,13 @@ hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
   }
   size_t own = (size_t)out->scene->parameters.pointers;
   rig_part part = RIG_SESSION;
-  out->pointer_count = options->player != NULL     ? 0
-                       : options->device_count > 0 ? options->device_count
-                                                   : own;
+  out->device_count = options->player != NULL     ? 0
+                      : options->device_count > 0 ? options->device_count
+                                                  : own;
   status = create_session(options, out, detail);
-  for (size_t i = 0; i < out->pointer_count && status >= HAP_OK; ++i) {
+  for (size_t i = 0; i < out->device_count && status >= HAP_OK; ++i) {
     part = RIG_POINTER;
-    status = add_pointer(options, out, i, detail);
+    status = add_device(options, out, i, detail);
   }
   if (status >= HAP_OK) {
     part = RIG_RECORDING;

@@ -18,8 +18,10 @@ typedef struct rig_options {
   const char *scene;                  /* "name" or "name:N" */
   const scene_parameters *parameters; /* not NULL: build from these with count, not from scene */
   int count;
-  const char *devices[RIG_POINTERS_MAX]; /* specs in pointer order; "virtual" alone: the scene's
-                                            own simulated hand; none given: the same */
+  /* Specs in pointer order; "virtual" alone: the scene's own simulated hand; none given: the same.
+   * Further end effectors of a device take what the scene has more of hands than there are devices,
+   * behind the device's first one. */
+  const char *devices[RIG_POINTERS_MAX];
   size_t device_count;
   /* Pointer 0's, which the rig takes over and puts where the scene's own hand begins; NULL: as
    * devices says */
@@ -53,7 +55,9 @@ typedef enum rig_part {
 typedef struct rig {
   scene *scene;
   hap_session *session;
-  hap_device *devices[RIG_POINTERS_MAX];
+  hap_device *devices[RIG_POINTERS_MAX]; /* device_count */
+  size_t device_count;
+  size_t effectors_left; /* end effectors that drive no pointer */
   hap_pointer_id pointers[RIG_POINTERS_MAX];
   size_t pointer_count;
   rig_part failed; /* what it was after a rig_create that failed */

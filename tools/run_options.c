@@ -220,7 +220,8 @@ static const option table[] = {
     {"--model", "NAME", "single, impulse, accelerance, contact (default)", take_model, 0, 0, 0},
     {"--device", "SPEC",
      "device of the next pointer, such as virtual or replay:hand.csv\n"
-     "(default, and virtual alone: the scene's own simulated hand)",
+     "(default, and virtual alone: the scene's own simulated hand); further end\n"
+     "effectors of it take the scene's further hands",
      take_device, 0, 0, 0},
     {"--identity", "FILE", "what --identify wrote, for the --device before it", take_identity, 0, 0,
      0},

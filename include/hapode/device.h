@@ -72,6 +72,10 @@ typedef struct hap_axis_info {
   double low; /* of its values; low < high, both within 1e6 */
   double high;
   double max_force; /* N, N m or 1, either way; 0: it gives no force */
+  /* What the maker promises to hold, at any haptic_hz from 1 kHz on; in the unit of max_force by
+   * that of the axis, and by that a second. 0: not known, else from 1e-15 to 1e9 */
+  double rated_stiffness;
+  double rated_damping;
 } hap_axis_info;
 
 /* How strongly a vibrator shakes, and how fast. Final. */

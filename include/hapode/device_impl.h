@@ -137,7 +137,7 @@ typedef struct hap_device_ops {
   void (*explain)(void *self, hap_detail *out);
 
   /* For devices whose describe says axis_count: an axis of an end effector, both from 0. As
-   * describe. */
+   * describe: rated_stiffness and rated_damping are newer than ABI 3 (HAP_HAS_MEMBER). */
   void (*describe_axis)(void *self, uint32_t effector, uint32_t axis, hap_axis_info *out);
 } hap_device_ops;
 

@@ -128,9 +128,11 @@ typedef struct hap_force_def {
   double damping;    /* N s/m, 0..1e6, SPRING and VISCOUS; cut likewise */
   double mass;       /* kg, 0..1e3, WEIGHT */
   double gravity[3]; /* m/s^2, default 0 0 -9.81, WEIGHT */
-  double strength;   /* N, 0..1e6, the largest force of MAGNET, DETENTS and VIBRATION */
-  double range;      /* m, 1e-4..100, default 0.02, MAGNET: no force from there on */
-  double pitch;      /* m, 1e-5..100, default 0.005, DETENTS */
+  /* N, 0..1e6, the largest force of MAGNET, DETENTS and VIBRATION. Of the first two it is cut where
+   * they are steeper than the spring that the device can hold: HAP_SATURATED */
+  double strength;
+  double range; /* m, 1e-4..100, default 0.02, MAGNET: no force from there on */
+  double pitch; /* m, 1e-5..100, default 0.005, DETENTS */
   hap_force_wave vibration;
 
   double fade_in_s; /* s, 0..60, default 0.02: after add the force comes in linearly */
@@ -165,9 +167,9 @@ HAP_API void hap_force_def_init(hap_force_def *def, size_t size_of_def);
  * proxy does not feel it: it acts on the hand. It stays until it is removed, also over
  * hap_session_stop. No force acts while a fault is latched.
  *
- * HAP_SATURATED, and it is added: stiffness or damping was above what the device can hold and was
- * cut; hap_session_detail has the number. HAP_ERROR_ARGUMENT, and hap_session_detail names the
- * field. HAP_ERROR_CAPACITY: HAP_FORCES_MAX. HAP_ERROR_NOT_FOUND: no such pointer.
+ * HAP_SATURATED, and it is added: stiffness, damping or strength was above what the device can hold
+ * and was cut; hap_session_detail has the number. HAP_ERROR_ARGUMENT, and hap_session_detail names
+ * the field. HAP_ERROR_CAPACITY: HAP_FORCES_MAX. HAP_ERROR_NOT_FOUND: no such pointer.
  * HAP_ERROR_UNINITIALISED: def did not go through hap_force_def_init. HAP_ERROR_STATE: the session
  * plays a recording, which has its own. HAP_ERROR_MEMORY: none for the samples. HAP_ERROR_THREAD:
  * from within a call of a force. HAP_ERROR_NOT_FOUND: or the session does not know the body. */

@@ -51,6 +51,36 @@ typedef void (*hap_pointer_surface_fn)(void *user, hap_pointer_id pointer, dGeom
  * of the step, s. Never called for testing simulations. */
 typedef void (*hap_step_fn)(void *user, double step_s);
 
+/* A point at which two geoms touch, or soon will. It has a size and may grow at its end. What is
+ * above `surface` is to be read; changes of it have no effect. */
+typedef struct hap_contact {
+  uint32_t size;              /* bytes filled in */
+  uint32_t in_loop;           /* 1: a contact of the loop; 0: of the world's step */
+  dGeomID a;                  /* in the order of hap_surface_fn; to be compared, and no more: */
+  dGeomID b;                  /* in_loop, the application may have destroyed them meanwhile */
+  void *data_a;               /* dGeomGetData of a, at the last step of physics */
+  void *data_b;               /* of b */
+  double point[3];            /* m, world */
+  double normal[3];           /* unit, world, from b to a */
+  double depth;               /* m; below 0: a gap, and the two do not touch yet */
+  double velocity[3];         /* m/s, world: of a at the point, as b sees it */
+  dSurfaceParameters surface; /* as hap_surface_fn said it; to be changed for this contact */
+  double direction[3]; /* first friction direction, with dContactFDir1 in surface.mode: world axes,
+                          any length; to be changed */
+} hap_contact;
+
+/* [physics, contact: both may call at once] Whether this contact is one, and with which surface:
+ * one side of a platform, a belt that runs round a corner. Called for each contact of the pairs
+ * that hap_surface_fn lets collide: in each step of the world (not in testing simulations, which
+ * have the contacts of the step), and for contacts of the loop in each contact pass. The answer
+ * follows from *io and from memory that no thread writes. Nothing of ODE and of the session is to
+ * be called but hap_session_post. A pass waits for the callback, and ticks go on with the contacts
+ * of the pass before. Pointers are not asked about: see hap_pointer_surface_fn.
+ *
+ * False: no contact here. A surface with a number that is not finite or out of range, or a
+ * direction that is not finite, is HAP_FAULT_WORLD; the contact stays as hap_surface_fn said it. */
+typedef bool (*hap_contact_fn)(void *user, hap_contact *io);
+
 /* The application's world. It has a size and may grow at its end.
  *
  * Access. From start to stop the world is touched only under hap_session_lock, in a posted edit, in
@@ -58,9 +88,9 @@ typedef void (*hap_step_fn)(void *user, double step_s);
  * ODE's moved callbacks) come while lists of the world are in use. They read the world, and post
  * what they want changed (docs/editing.md).
  *
- * Bodies known to the session: those of the geoms in space and in spaces inside it, the bodies that
- * are jointed to them, and adopted ones. ODE cannot list a world's bodies. Any other body must be
- * adopted, or a testing simulation would move it.
+ * Bodies known to the session: those of the geoms in its spaces and in spaces inside them, the
+ * bodies that are jointed to them, and adopted ones. ODE cannot list a world's bodies. Any other
+ * body must be adopted, or a testing simulation would move it.
  *
  * Auto-disable. From start to stop the session sets flag, idle time and angular threshold of
  * auto-disable on bodies (dBodyGetAutoDisableFlag says 0), and the axis of finite rotation where
@@ -87,7 +117,7 @@ typedef struct hap_ode_def {
   uint32_t size;                          /* set by hap_ode_def_init */
   uint32_t cookie;                        /* set by hap_ode_def_init */
   dWorldID world;                         /* borrowed; one session for each world */
-  dSpaceID space;                         /* borrowed */
+  dSpaceID space;                         /* borrowed; more: hap_session_add_space */
   hap_surface_fn surface;                 /* NULL: every pair collides with mu = infinity */
   hap_step_fn before_step;                /* may be NULL */
   hap_step_fn after_step;                 /* may be NULL */
@@ -102,6 +132,11 @@ typedef struct hap_ode_def {
    * while recording. It pays where there are many islands and idle cores; one thread steps one
    * island. */
   int32_t island_threads;
+  uint32_t reserved;      /* 0 */
+  hap_contact_fn contact; /* may be NULL */
+  /* m, 0..0.1, default 0: the farthest from which a surface may pull a pointer. pointer_surface is
+   * asked about geoms that are as much farther away. */
+  double magnet_reach;
 } hap_ode_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
@@ -142,6 +177,31 @@ HAP_API hap_status hap_session_forget_body(hap_session *session, dBodyID body);
  * quaternion not unit within 1e-3. HAP_ERROR_NOT_FOUND: the session does not know the body. */
 HAP_API hap_status hap_session_teleport_body(hap_session *session, dBodyID body,
                                              const hap_pose *pose);
+
+#define HAP_SPACES_MAX 16 /* that are added to a session's first one */
+
+/* What the geoms of an added space meet: bits. */
+typedef enum hap_space_pairs {
+  HAP_SPACE_INSIDE = 1, /* each other */
+  HAP_SPACE_OTHERS = 2 /* geoms of other spaces that have this bit, too; the first space has both */
+} hap_space_pairs;
+
+/* [locked, or control before start] The session also has the geoms of this top-level space:
+ * pointers touch them, and bodies meet them as pairs (hap_space_pairs) says. Spaces inside the
+ * space belong to it. The space is borrowed until it is removed, or the session is destroyed.
+ * Meanwhile it is in a private space of the session (dGeomGetSpace).
+ *
+ * HAP_ERROR_ARGUMENT: no space, no known pair, or a space that is inside another one.
+ * HAP_ERROR_STATE: this or another session has it. HAP_ERROR_CAPACITY: HAP_SPACES_MAX are there.
+ * HAP_ERROR_MEMORY. */
+HAP_NODISCARD HAP_API hap_status hap_session_add_space(hap_session *session, dSpaceID space,
+                                                       uint32_t pairs);
+
+/* [locked, or control before start] Before dSpaceDestroy of an added space: the session drops what
+ * it knows of its geoms, and forgets their bodies (hap_session_forget_body). Without this call the
+ * next step notices that the space is gone, and the session says so. A body that stays in the world
+ * is to be adopted. HAP_ERROR_NOT_FOUND: it is not an added one. */
+HAP_API hap_status hap_session_remove_space(hap_session *session, dSpaceID space);
 
 /* [locked] Before dGeomDestroy of a geom that a pointer may be near to, and after a change of a
  * mesh's triangles. Without it the next step notices the first. Of the second it notices only what

@@ -56,9 +56,11 @@ HAP_API void hap_pointer_outputs_init(hap_pointer_outputs *outputs, size_t size_
  * hap_session_stop and hap_pointer_restart.
  *
  * A force on an axis goes to the new one in 20 ms, and never faster than 2 ms from none to the
- * axis's max_force; an amplitude likewise. A stiffness or damping is not cut: what an axis can hold
- * is known to its maker alone. A fault, a held clutch, doubt about the device and late ticks act on
- * axes and vibrators as on the wrench: under a fault there is none. LEDs stay.
+ * axis's max_force; an amplitude likewise. A fault, a held clutch, doubt about the device and late
+ * ticks act on axes and vibrators as on the wrench: under a fault there is none. LEDs stay.
+ *
+ * HAP_SATURATED, and they are set: a stiffness or damping was above the rated one of the axis and
+ * was cut; hap_session_detail has the number. Of an axis without rated figures nothing is cut.
  *
  * HAP_ERROR_ARGUMENT, and nothing changes: a field out of range, or of something that the device
  * does not have; hap_session_detail names the field. HAP_ERROR_UNSUPPORTED: the pointer has no
@@ -66,6 +68,14 @@ HAP_API void hap_pointer_outputs_init(hap_pointer_outputs *outputs, size_t size_
  * hap_pointer_outputs_init. HAP_ERROR_STATE: the session plays a recording, which has its own. */
 HAP_API hap_status hap_pointer_set_outputs(hap_session *session, hap_pointer_id pointer,
                                            const hap_pointer_outputs *outputs);
+
+/* [any] What was set last, with the promises as they came out: max_power of an axis is no
+ * HAP_FORCE_POWER_AUTO any more once something was set. Before that it is what
+ * hap_pointer_outputs_init gives; in a replay, too, as a recording keeps to itself what it has.
+ * *out went through hap_pointer_outputs_init. HAP_ERROR_NOT_FOUND: no such pointer.
+ * HAP_ERROR_UNINITIALISED: out did not go through it. HAP_ERROR_ARGUMENT: a NULL. */
+HAP_API hap_status hap_pointer_get_outputs(hap_session *session, hap_pointer_id pointer,
+                                           hap_pointer_outputs *out);
 
 HAP_END_DECLS
 

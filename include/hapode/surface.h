@@ -37,6 +37,17 @@ typedef struct hap_surface {
   double impact_force; /* N s/m, 0..1000; 0, as it comes: none */
   double impact_decay; /* 1/s, 10..10000; comes with 80 */
   double impact_hz;    /* Hz, 5..1000 and at most a fourth of haptic_hz; comes with 100 */
+  /* N, 0..100: what a touch holds the hand with when it draws back, as sticky tape does. The
+   * contact's spring then pulls, until the pull comes to this or the hand is 10 mm off; then the
+   * touch is over. A hand that comes is not pulled. The body gets the opposite force. Friction goes
+   * by the normal force plus this. Points of a hull share it. 0, as it comes: none. */
+  double adhesion;
+  /* N, 0..100: the surface pulls the pointer to its nearest point, from magnet_reach above it on,
+   * with this force at 0.58 of the reach, and with none where the two meet: as HAP_FORCE_MAGNET,
+   * declared as that is. The body gets the opposite force, in models CONTACT and SINGLE; in the
+   * others bodies that move do not pull. 0, as it comes: none. */
+  double magnet_force;
+  double magnet_reach; /* m, 0.001..hap_ode_def.magnet_reach; comes with that */
 } hap_surface;
 
 /* [haptic] m, -0.003..0.003: the height of a surface over a geom, at a point of the geom's frame;

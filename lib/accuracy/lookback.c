@@ -44,12 +44,15 @@ static bool geom_is_there(const hapi_lookback *w, dGeomID geom)
   return hapi_index_get(&w->geoms, hapi_index_address(geom)) != HAPI_INDEX_NONE;
 }
 
-static bool window_find_geoms(hapi_lookback *w, dSpaceID space)
+static bool window_find_geoms(hapi_lookback *w)
 {
+  const hapi_spaces *spaces = &w->world->spaces;
   uint32_t count = 0;
   hapi_index_clear(&w->geoms);
-  if (!window_see_geoms(w, space, &count)) {
-    return false;
+  for (uint32_t i = 0; i < spaces->count; ++i) {
+    if (!window_see_geoms(w, spaces->list[i].space, &count)) {
+      return false;
+    }
   }
   for (uint32_t i = 0; i < w->pairs.count; ++i) {
     w->pairs.list[i].there =
@@ -299,7 +302,7 @@ static hap_status window_enter(hapi_lookback *w, double step_s)
 
 static hap_status window_run(hapi_lookback *w, int own_iterations, double seconds)
 {
-  if (!window_find_geoms(w, w->world->ode.space)) {
+  if (!window_find_geoms(w)) {
     return HAP_ERROR_MEMORY;
   }
   hap_status status = window_enter(w, w->cycle->probe_step_s);
@@ -506,8 +509,8 @@ void hapi_lookback_note(hapi_lookback *w)
                                          .pointer = hit->pointer,
                                          .generation = pointer->generation,
                                          .is_tool = true,
-                                         .mu = hit->mu};
-      w->spoilt = w->spoilt || hit->feel != 0;
+                                         .mu = hit->said.mu};
+      w->spoilt = w->spoilt || hit->said.feel != 0;
       if (hit->tool_count > 0) {
         window_note_touch(w, most, &touch);
       }

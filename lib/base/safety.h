@@ -35,6 +35,7 @@
 #define HAPI_SAFETY_GAP_MOST_S 0.02          /* s */
 #define HAPI_SAFETY_REST_GAPS 2.0            /* 1 */
 #define HAPI_SAFETY_UNREAD_S 0.02            /* s */
+#define HAPI_SAFETY_READ_LATE_S 0.002        /* s */
 #define HAPI_SAFETY_DOUBT_FORGET 0.25        /* 1 */
 #define HAPI_SAFETY_STRING_SHARE 2.0         /* 1 */
 #define HAPI_SAFETY_STALE_QUANTA 6.0         /* 1 */
@@ -72,6 +73,7 @@
 #define HAPI_SAFETY_TEXTURE_HEIGHT 0.003    /* m */
 #define HAPI_SAFETY_IMPACT_FORCE 5.0        /* N */
 #define HAPI_SAFETY_IMPACT_POWER 1.0        /* W */
+#define HAPI_SAFETY_ADHESION_WAY 0.01       /* m */
 
 /* ---- a grip ---- */
 #define HAPI_SAFETY_GRAB_SPEED 0.5  /* m/s */

@@ -11,6 +11,7 @@
 #include "base/histogram.h"
 #include "base/thread.h"
 #include "base/vec.h"
+#include "contact/asking.h"
 #include "contact/flat_areas.h"
 #include "sync/mesh_filter.h"
 #include "sync/tool_seams.h"
@@ -59,6 +60,7 @@ typedef struct tool_memory {
 typedef struct pair_group {
   hapi_flat_areas flat;
   hapi_patch_contact contacts[HAPI_FLAT_POINTS];
+  hapi_contact_spot spots[HAPI_FLAT_POINTS]; /* where somebody is asked about them */
 } pair_group;
 
 struct hapi_contact {
@@ -69,6 +71,7 @@ struct hapi_contact {
   pass_body *bodies; /* capacity.bodies */
   pass_pair *pairs;  /* capacity.pairs */
   tool_memory tools;
+  hapi_asking asking;
   uint64_t number;
   uint32_t lingers;          /* passes that are made although nothing is left to find */
   _Atomic uint64_t left_out; /* pairs without room for their contacts, sum over the passes */
@@ -240,26 +243,82 @@ static void pair_contact(const placed_pair *found, const hapi_near_pair *pair, i
   out->key = pair->key;
 }
 
-/* What its contacts have in common; their points are there. */
-static void patches_add_pair(const hapi_near_pair *pair, hapi_patches *out)
+static void placed_velocity(const placed_geom *geom, const double point[3], double out[3])
 {
+  hapi_v3_set(out, 0.0, 0.0, 0.0);
+  if (geom->body != NULL) {
+    double arm[3];
+    hapi_v3_sub(point, geom->body->pose.position, arm);
+    hapi_v3_cross(geom->body->twist.angular, arm, out);
+    hapi_v3_add(out, geom->body->twist.linear, out);
+  }
+}
+
+/* Of side a, or of side b. */
+static void surface_point(const placed_geom *geom, const hapi_patch_point *p, bool of_b,
+                          double out[3])
+{
+  static const double along[3] = {0.0, 0.0, 1.0};
+  double side = of_b ? 1.0 : -1.0;
+  double rim = of_b ? p->rim_b : p->rim_a;
+  hapi_v3_madd(of_b ? p->core_b : p->core_a, side * (of_b ? p->ball_b : p->ball_a), p->normal, out);
+  if (rim > 0.0) {
+    double axis[3];
+    double across[3];
+    hapi_quat_rotate(geom->pose.quat_wxyz, along, axis);
+    hapi_v3_madd(p->normal, -hapi_v3_dot(p->normal, axis), axis, across);
+    double length = hapi_v3_norm(across);
+    if (length > 1e-12) {
+      hapi_v3_madd(out, side * rim / length, across, out);
+    }
+  }
+}
+
+/* What the application is told of a point. */
+static void pair_spot(const placed_pair *found, int point, hapi_contact_spot *out)
+{
+  const hapi_patch_point *p = &found->patch.points[point];
+  double ends[2][3];
+  double velocity[3];
+  surface_point(&found->a, p, false, ends[0]);
+  surface_point(&found->b, p, true, ends[1]);
+  hapi_v3_add(ends[0], ends[1], out->point);
+  hapi_v3_scale(0.5, out->point, out->point);
+  hapi_v3_copy(p->normal, out->normal);
+  out->gap = p->gap;
+  placed_velocity(&found->a, out->point, out->velocity);
+  placed_velocity(&found->b, out->point, velocity);
+  hapi_v3_sub(out->velocity, velocity, out->velocity);
+}
+
+/* What its contacts have in common; their points are there. */
+static void patches_add_pair(hapi_contact *contact, const hapi_near_pair *pair, hapi_patches *out)
+{
+  if (contact->near->said_count > 0) {
+    contact->asking.pairs[out->surface_count] = (uint32_t)(pair - hapi_near_pairs(contact->near));
+  }
   hapi_patches_pairs(out)[out->surface_count] = pair->tags;
   hapi_patches_surfaces(out)[out->surface_count++] = pair->surface;
 }
 
-static void fill_pair(const placed_pair *found, const hapi_near_pair *pair, hapi_patches *out)
+static void fill_pair(hapi_contact *contact, const placed_pair *found, const hapi_near_pair *pair,
+                      hapi_patches *out)
 {
   for (int i = 0; i < found->patch.count; ++i) {
+    if (contact->near->said_count > 0) {
+      pair_spot(found, i, &contact->asking.spots[out->contact_count]);
+    }
     hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
     pair_contact(found, pair, i, c);
     c->surface = out->surface_count;
   }
-  patches_add_pair(pair, out);
+  patches_add_pair(contact, pair, out);
 }
 
 /* Neighbours in a mesh share their corners and edges, and each of them finds the point there.
  * False: there is no room for all points. */
-static bool group_add(pair_group *group, const placed_pair *found, const hapi_near_pair *pair)
+static bool group_add(pair_group *group, const placed_pair *found, const hapi_near_pair *pair,
+                      bool asks)
 {
   uint32_t first = HAPI_SLOT_NONE;
   for (int i = 0; i < found->patch.count; ++i) {
@@ -271,6 +330,9 @@ static bool group_add(pair_group *group, const placed_pair *found, const hapi_ne
     if (at == group->flat.count) {
       (void)hapi_flat_add(&group->flat, point->core_a, point->normal, point->gap);
       pair_contact(found, pair, i, &group->contacts[at]);
+      if (asks) {
+        pair_spot(found, i, &group->spots[at]);
+      }
     }
     first = first == HAPI_SLOT_NONE ? at : first;
     hapi_flat_join(&group->flat, first, at);
@@ -288,6 +350,7 @@ static uint32_t fill_group(hapi_contact *contact, uint32_t first, uint64_t *io_w
   pass_pair *pass = &contact->pairs[first];
   uint32_t end = first;
   bool all = true;
+  bool asks = contact->near->said_count > 0;
   group->flat.count = 0;
   pass->spare = HUGE_VAL;
   for (; end < contact->near->pair_count && pairs[end].key == pairs[first].key; ++end) {
@@ -295,7 +358,7 @@ static uint32_t fill_group(hapi_contact *contact, uint32_t first, uint64_t *io_w
     contact->pairs[end].count = 0;
     if (!pass->left_out && find_pair(contact, end, &found)) {
       pass->spare = fmin(pass->spare, found.patch.points[0].gap - found.margin);
-      all = group_add(group, &found, &pairs[end]) && all;
+      all = group_add(group, &found, &pairs[end], asks) && all;
     }
   }
   atomic_fetch_add_explicit(&contact->left_out, !all, memory_order_relaxed);
@@ -304,12 +367,15 @@ static uint32_t fill_group(hapi_contact *contact, uint32_t first, uint64_t *io_w
   if (pass->count > 0 && *io_wanted <= contact->config.capacity.contacts) {
     for (uint32_t i = 0; i < group->flat.count; ++i) {
       if (!group->flat.points[i].spare) {
+        if (asks) {
+          contact->asking.spots[out->contact_count] = group->spots[i];
+        }
         hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
         *c = group->contacts[i];
         c->surface = out->surface_count;
       }
     }
-    patches_add_pair(&pairs[first], out);
+    patches_add_pair(contact, &pairs[first], out);
   }
   return end;
 }
@@ -338,7 +404,7 @@ static bool fill_pairs(hapi_contact *contact, hapi_patches *out)
     pair->spare = found.patch.points[0].gap - found.margin;
     wanted += pair->count;
     if (wanted <= room) {
-      fill_pair(&found, &pairs[i], out);
+      fill_pair(contact, &found, &pairs[i], out);
     }
     ++i;
   }
@@ -468,7 +534,7 @@ static void tool_pair_add(const hapi_contact *contact, const placed_tool *tool,
   const mover self = {&tool->twist, tool->in->extent};
   const hapi_touch_side a = tool_side_at(tool, &pose);
   const hapi_touch_side b = geom_side(&geom);
-  double margin = margin_between(contact, self, geom_mover(&geom));
+  double margin = margin_between(contact, self, geom_mover(&geom)) + pair->reach;
   if (least_distance(&geom, &a, tool->in->extent) > margin) {
     ++io->pairs;
     return;
@@ -741,9 +807,10 @@ static void tape_follow(hapi_contact *contact, hapi_patches *out)
     cell->u[HAPI_PASS_NEAR] = hapi_exchange_taken(exchange, HAPI_CHANNEL_NEAR);
     cell->i[HAPI_PASS_VALID] = out->valid_from_ns;
     cell->u[HAPI_PASS_HASH] = patches_hash(out);
+    hapi_verdicts_put(&contact->asking.verdicts, contact->tape, cell);
     hapi_tape_commit(contact->tape);
   } else if (hapi_tape_plays(contact->tape)) {
-    const hapi_cell *cell = hapi_tape_get(contact->tape, HAPI_CELL_PASS, 0);
+    const hapi_cell *cell = contact->asking.played;
     const hapi_difference difference = {.what = HAPI_DIFFERS_PASS, .number = out->number};
     if (cell->u[HAPI_PASS_HASH] != patches_hash(out)) {
       hapi_tape_differ(contact->tape, &difference);
@@ -763,6 +830,7 @@ static bool work_is_left(const hapi_contact *contact)
 static void pass_make(hapi_contact *contact, int64_t valid_from_ns)
 {
   hapi_patches *out = hapi_exchange_patches_back(contact->config.exchange);
+  hapi_asking_begin(&contact->asking, contact->tape, contact->config.capacity.contacts);
   bodies_place(contact);
   for (uint32_t i = 0; i < contact->near->pair_count; ++i) {
     contact->pairs[i].left_out = false;
@@ -771,6 +839,7 @@ static void pass_make(hapi_contact *contact, int64_t valid_from_ns)
     leave_out_farthest(contact);
     (void)fill_pairs(contact, out);
   }
+  hapi_asking_run(&contact->asking, contact->near, contact->tape, out);
   tools_fill(contact, out);
   out->number = ++contact->number;
   bool found = out->contact_count + out->tool_count > 0;
@@ -812,6 +881,8 @@ hap_status hapi_contact_create(const hapi_contact_config *config, hapi_contact *
     return HAP_ERROR_MEMORY;
   }
   contact->config = *config;
+  contact->asking.ask = config->ask;
+  contact->asking.of = config->ask_of;
   contact->bodies = hapi_alloc_array(config->capacity.bodies, sizeof *contact->bodies);
   contact->pairs = hapi_alloc_array(config->capacity.pairs, sizeof *contact->pairs);
   tool_memory *tools = &contact->tools;
@@ -823,7 +894,8 @@ hap_status hapi_contact_create(const hapi_contact_config *config, hapi_contact *
   contact->group = hapi_alloc(sizeof *contact->group);
   if (contact->bodies == NULL || contact->pairs == NULL || contact->group == NULL ||
       tools->geoms == NULL || tools->parts == NULL || tools->points == NULL ||
-      tools->marks == NULL) {
+      tools->marks == NULL ||
+      (config->ask != NULL && !hapi_asking_create(&contact->asking, config->capacity.contacts))) {
     hapi_contact_destroy(contact);
     return HAP_ERROR_MEMORY;
   }
@@ -844,6 +916,7 @@ void hapi_contact_destroy(hapi_contact *contact)
   hapi_free(contact->tools.points);
   hapi_free(contact->tools.marks);
   hapi_free(contact->group);
+  hapi_asking_finish(&contact->asking);
   hapi_free(contact);
 }
 

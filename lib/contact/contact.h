@@ -23,6 +23,8 @@ typedef struct hapi_contact_config {
   double haptic_hz;
   int rt_priority;
   hapi_exchange *exchange;
+  hapi_contact_ask_fn ask; /* NULL: nobody is asked about contacts */
+  const void *ask_of;
 } hapi_contact_config;
 
 hap_status hapi_contact_create(const hapi_contact_config *config, hapi_contact **out);

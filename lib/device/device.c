@@ -177,8 +177,8 @@ static bool axis_has_range(const hap_axis_info *axis)
 
 bool hapi_device_axis_good(const hap_axis_info *axis)
 {
-  return axis_is_known(axis) && axis_has_range(axis) &&
-         hapi_device_figures_good(&axis->max_force, 1);
+  const double figures[] = {axis->max_force, axis->rated_stiffness, axis->rated_damping};
+  return axis_is_known(axis) && axis_has_range(axis) && hapi_device_figures_good(figures, 3);
 }
 
 static hap_status check_axis(const hap_device_ops *ops, uint32_t index, const hap_axis_info *axis,
@@ -190,7 +190,8 @@ static hap_status check_axis(const hap_device_ops *ops, uint32_t index, const ha
   return hapi_fail(
       detail, HAP_ERROR_DEVICE, "device '%s', axis %u: %s", ops->name, index,
       !axis_is_known(axis)   ? "an unknown kind or unit; is the library older than the device?"
-      : axis_has_range(axis) ? "max_force is neither 0 nor from 1e-15 to 1e9"
+      : axis_has_range(axis) ? "max_force, rated_stiffness or rated_damping is neither 0 nor "
+                               "from 1e-15 to 1e9"
                              : "low and high are not finite, beyond 1e6, or not in this order");
 }
 

@@ -25,7 +25,7 @@
  *
  *   ramps    a contact that comes in slowly, and a force that fades or comes back, change the
  *            stiffness of a spring under load: the world's work, to either side. The energy in the
- *            spring of a contact that is no more is lost.
+ *            spring of a contact that is no more is lost, as of one that stuck and has let go.
  *   grips    as the springs of contacts; a place that moves in the body is the world's work.
  *   base     the motion of a device's frame in the world, and a stiffness that is set, are the
  *            world's work: to either side.
@@ -213,7 +213,8 @@ static double surfaces_give(const hapi_tick_facts *facts, const hapi_pointers *p
   return sum;
 }
 
-/* J in the spring of a contact that goes no farther than to the limit of the force; k: N/m. */
+/* J in the spring of a contact that goes no farther than to the limit of the force; k: N/m, depth:
+ * m, also of a spring that pulls. */
 static double spring_energy(const hapi_pointer *p, double k, double depth)
 {
   double force = k * depth;
@@ -270,16 +271,21 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     double share = c->hidden ? 0.0 : r->share * p->guard.felt;
     double stiffness = hapi_touch_stiffness(c, p);
     double depth = r->depth + (c->feel.special ? c->feel.lift : 0.0);
-    double energy = spring_energy(p, c->weight * share * stiffness, depth - r->excess);
+    double strain = hapi_touch_strain(c, depth - r->excess);
+    double energy = spring_energy(p, c->weight * share * stiffness, strain);
     double rubs = c->feel.mu > 0.0 ? hapi_friction_energy(touches, tick, c) : 0.0;
     gone -= r->sprung;
+    if (r->drawn > 0.0 && !c->feel.sticks) {
+      sum -= r->drawn;
+    }
+    r->drawn = c->feel.sticks && depth < r->excess ? energy : 0.0;
     if (share != r->felt_share || r->excess != r->felt_excess ||
         stiffness != r->felt_stiffness) { /* seldom */
       /* Over a jump the hand paid for no depth, so none of it is lost. */
       double excess = r->late || p->device.jumped ? r->excess : r->felt_excess;
       double before = c->weight * r->felt_share * r->felt_stiffness;
-      sum += energy - spring_energy(p, before, depth - excess);
-      double unpaid = depth - r->excess - r->given;
+      sum += energy - spring_energy(p, before, hapi_touch_strain(c, depth - excess));
+      double unpaid = hapi_touch_strain(c, depth - r->excess - r->given);
       sum += hand_gets(p) * (energy - spring_energy(p, c->weight * share * stiffness, unpaid));
       sum +=
           (p->guard.felt - r->felt) * rubs; /* a deep contact's friction comes in with its limit */

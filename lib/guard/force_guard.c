@@ -314,14 +314,15 @@ static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
   double torque_rate = fault ? hapi_max(p->device.limits.slew_torque,
                                         p->device.limits.max_torque / HAPI_SAFETY_FADE_S)
                              : p->device.limits.slew_torque;
-  /* What a gap has changed is not felt at once. But a force that the world asks no more, as a
-   * contact has ended, and one that the energy observer takes, would be energy for the hand that
-   * draws back. */
+  /* What a gap has changed is not felt at once, nor is what the energy observer gives back while
+   * there is less force. But a force that the world asks no more, as a contact has ended, and one
+   * that the energy observer takes, would be energy for the hand that draws back. */
   double before = hapi_v3_dot(g->written.force, g->written.force);
   bool falls = hapi_v3_dot(p->device.wrench.force, p->device.wrench.force) < before;
   bool at_once = falls && ((g->flags & HAP_GUARD_ENERGY) != 0 ||
                            hapi_v3_dot(g->wanted.force, g->wanted.force) < before);
-  if (!fault && guard->late.slew_s > 0.0 && !at_once) {
+  bool late = guard->late.slew_s > 0.0 || g->late_loss > 0.0;
+  if (!fault && late && !at_once) {
     force_rate = hapi_min(force_rate, p->device.limits.max_force / HAPI_SAFETY_LATE_SLEW_S);
     torque_rate = hapi_min(torque_rate, p->device.limits.max_torque / HAPI_SAFETY_LATE_SLEW_S);
   }

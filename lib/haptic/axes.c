@@ -47,6 +47,8 @@ static void info_put(hapi_tape *tape, uint32_t index, const hap_axis_info *axis)
   cell->d[0] = axis->low;
   cell->d[1] = axis->high;
   cell->d[2] = axis->max_force;
+  cell->d[3] = axis->rated_stiffness;
+  cell->d[4] = axis->rated_damping;
 }
 
 static void info_get(hapi_tape *tape, uint32_t index, hap_axis_info *out)
@@ -57,7 +59,9 @@ static void info_get(hapi_tape *tape, uint32_t index, hap_axis_info *out)
                          .unit = cell->word >> INFO_UNIT_SHIFT,
                          .low = cell->d[0],
                          .high = cell->d[1],
-                         .max_force = cell->d[2]};
+                         .max_force = cell->d[2],
+                         .rated_stiffness = cell->d[3],
+                         .rated_damping = cell->d[4]};
 }
 
 void hapi_tape_axis_infos(hapi_tape *tape, uint32_t index, hap_axis_info *io_axes,

@@ -47,9 +47,25 @@ hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
   return (hapi_coupling_gains){true, k, DAMPING_SHARE * fmax(0.0, b - k * late)};
 }
 
+static double device_mass(const hap_device_info *device)
+{
+  return device->mass > 0.0 ? device->mass : HAPI_SAFETY_OWN_MASS;
+}
+
 double hapi_device_damping(const hap_device_info *device, double period, double scale)
 {
-  double mass = device->mass > 0.0 ? device->mass : HAPI_SAFETY_OWN_MASS;
+  double mass = device_mass(device);
   double age = (device->measures_velocity != 0 ? 0.5 : 1.5) * period + device->delay;
   return HAPI_SAFETY_OWN_DAMPING * mass / (age * scale);
+}
+
+hapi_pointer_holds hapi_pointer_holds_of(const hap_device_info *device,
+                                         const hapi_pointer_setup *pointer, double period,
+                                         double scale)
+{
+  hapi_coupling_gains gains = hapi_coupling_gains_of(device, pointer, period);
+  return (hapi_pointer_holds){
+      .stiffness = gains.known ? gains.stiffness / scale : pointer->stiffness,
+      .damping = hapi_device_damping(device, period, scale),
+      .mass = device_mass(device) / scale};
 }

@@ -10,6 +10,7 @@
 #include <hapode/device.h>
 
 #include "base/pointer_setup.h"
+#include "pointer/holds.h"
 
 typedef struct hapi_coupling_gains {
   bool known;
@@ -31,5 +32,11 @@ hapi_coupling_gains hapi_coupling_gains_of(const hap_device_info *device,
  * tick where they are estimated (pointer/own_force.c). scale: N/m of the device by one of the
  * world, above 0. */
 double hapi_device_damping(const hap_device_info *device, double period, double scale);
+
+/* Of a spring as of a proxy's. Of a device without figures nobody knows: the stiffness of the
+ * pointer is what the application has chosen for it. scale as above. */
+hapi_pointer_holds hapi_pointer_holds_of(const hap_device_info *device,
+                                         const hapi_pointer_setup *pointer, double period,
+                                         double scale);
 
 #endif

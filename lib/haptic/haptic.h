@@ -87,6 +87,8 @@ hap_status hapi_haptic_get_settings(hapi_haptic *haptic, hap_pointer_id id,
 /* [any] outputs.h */
 hap_status hapi_haptic_set_outputs(hapi_haptic *haptic, hap_pointer_id id,
                                    const hap_pointer_outputs *outputs, hap_detail *detail);
+/* *io stays as it is where nothing was set. */
+hap_status hapi_haptic_get_outputs(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_outputs *io);
 /* [any] Of its device; HAP_ERROR_UNSUPPORTED: that does not tell one. */
 hap_status hapi_haptic_workspace(hapi_haptic *haptic, hap_pointer_id id, double out_low[3],
                                  double out_high[3]);

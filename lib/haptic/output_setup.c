@@ -9,6 +9,28 @@
 /* What the application wants of a device beside the wrench: checked against what the device has,
  * promises filled in, and into the pointer's box. */
 
+/* What the device holds. */
+static hap_status axis_bound(const hap_axis_info *axis, uint32_t index, hap_axis_push *io,
+                             hap_detail *detail)
+{
+  const struct {
+    const char *name;
+    double most;
+    double *io;
+  } numbers[] = {{"stiffness", axis->rated_stiffness, &io->stiffness},
+                 {"damping", axis->rated_damping, &io->damping}};
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i) {
+    if (numbers[i].most > 0.0 && *numbers[i].io > numbers[i].most) {
+      status = hapi_fail(detail, HAP_SATURATED,
+                         "axes[%u].%s %g is cut to the %g that the device can hold", index,
+                         numbers[i].name, *numbers[i].io, numbers[i].most);
+      *numbers[i].io = numbers[i].most;
+    }
+  }
+  return status;
+}
+
 static hap_status axis_check(const hapi_pointer_slot *slot, uint32_t index, hap_axis_push *io,
                              hap_detail *detail)
 {
@@ -42,7 +64,7 @@ static hap_status axis_check(const hapi_pointer_slot *slot, uint32_t index, hap_
     double range = index < slot->info.axis_count ? axis->high - axis->low : 0.0;
     io->max_power = HAPI_SAFETY_AXIS_DRIVE * range * fmin(io->max_force, axis->max_force);
   }
-  return HAP_OK;
+  return index < slot->info.axis_count ? axis_bound(axis, index, io, detail) : HAP_OK;
 }
 
 static hap_status outputs_check(const hapi_pointer_slot *slot, hap_pointer_outputs *io,
@@ -73,10 +95,15 @@ static hap_status outputs_check(const hapi_pointer_slot *slot, hap_pointer_outpu
                      "to 1",
                      io->gripper_closed, io->gripper_open);
   }
+  hap_status cut = HAP_OK;
   for (uint32_t i = 0; i < HAP_AXES_MAX; ++i) {
-    HAPI_TRY(axis_check(slot, i, &io->axes[i], detail));
+    hap_status status = axis_check(slot, i, &io->axes[i], detail);
+    if (status < HAP_OK) {
+      return status;
+    }
+    cut = status != HAP_OK ? status : cut;
   }
-  return HAP_OK;
+  return cut;
 }
 
 hap_status hapi_haptic_set_outputs(hapi_haptic *haptic, hap_pointer_id id,
@@ -91,9 +118,23 @@ hap_status hapi_haptic_set_outputs(hapi_haptic *haptic, hap_pointer_id id,
                           ? outputs_check(slot, &checked, detail)
                           : hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "the pointer has no device");
   if (status >= HAP_OK) {
+    slot->outputs.last = checked;
     slot->outputs.places[hapi_triple_back(&slot->outputs.buffer)] = checked;
     hapi_triple_publish(&slot->outputs.buffer);
   }
   pthread_mutex_unlock(&slot->lock);
   return status;
+}
+
+hap_status hapi_haptic_get_outputs(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_outputs *io)
+{
+  hapi_pointer_slot *slot = hapi_slot_lock(haptic, id);
+  if (slot == NULL) {
+    return HAP_ERROR_NOT_FOUND;
+  }
+  if (slot->outputs.last.size != 0) {
+    *io = slot->outputs.last;
+  }
+  pthread_mutex_unlock(&slot->lock);
+  return HAP_OK;
 }

@@ -14,6 +14,7 @@
 typedef struct hapi_outputs_box {
   hapi_triple_buffer buffer;
   hap_pointer_outputs places[3]; /* size 0: nothing was set */
+  hap_pointer_outputs last;      /* that were set; of the slot's lock; size 0 likewise */
   bool again; /* the loop's: the pointer comes anew, with what was taken before */
 } hapi_outputs_box;
 

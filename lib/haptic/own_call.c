@@ -70,8 +70,7 @@ static void figures_note(hapi_own_caller *caller, int64_t spent_ns)
                         memory_order_relaxed);
 }
 
-/* One late call may be the scheduler's. */
-static bool caller_is_late(hapi_own_caller *caller, int64_t spent_ns, double seconds)
+bool hapi_own_call_is_late(hapi_own_caller *caller, int64_t spent_ns, double seconds)
 {
   caller->strikes = hapi_max(caller->strikes - HAPI_SAFETY_CALL_FORGET * seconds, 0.0);
   caller->strikes += spent_ns > caller->of.most_ns ? 1.0 : 0.0;
@@ -101,7 +100,7 @@ static void call_one(hapi_haptic *haptic, uint32_t index, hapi_own_caller *calle
     out->out = HAP_FORCE_OUT_NOT_FINITE;
   } else if (judged && hapi_standstill_pending(haptic)) {
     out->out = HAP_FORCE_OUT_BLOCKED;
-  } else if (judged && caller_is_late(caller, spent_ns, tick.seconds)) {
+  } else if (judged && hapi_own_call_is_late(caller, spent_ns, tick.seconds)) {
     out->out = HAP_FORCE_OUT_LATE;
   }
   if (out->out == HAP_FORCE_IN) {

@@ -7,44 +7,50 @@
 #include "base/safety.h"
 #include "haptic/coupling_gains.h"
 #include "haptic/haptic_internal.h"
+#include "pointer/own_force.h"
 
 /* What the application says of own forces: cut to what the device can hold, promises filled in, and
  * into the pointer's list. */
 
-/* What the device can hold: of a spring as of a proxy's. Of a device without figures nobody knows:
- * the stiffness of the pointer is what the application has chosen for it. A pointer without a
- * device has nothing that could swing. Of a damper see pointer/own_force.c: the velocity is old by
- * half a tick, by the device's delay, and by a tick where it is estimated. World units: a newton is
- * force_scale newtons of the device. */
+/* What the device can hold. A pointer without a device has nothing that could swing. Of a damper
+ * see pointer/own_force.c: the velocity is old by half a tick, by the device's delay, and by a tick
+ * where it is estimated. World units: a newton is force_scale newtons of the device. */
 static hap_status setup_bound(const hapi_haptic *haptic, const hapi_pointer_slot *slot,
                               hapi_force_setup *io, hap_detail *detail)
 {
-  double period = haptic->tick.facts.period;
-  hapi_coupling_gains gains = hapi_coupling_gains_of(&slot->info, &slot->def, period);
   double scale = slot->def.motion_scale * slot->def.force_scale;
-  double damping = hapi_device_damping(&slot->info, period, scale);
-  double unknown = slot->has_device ? slot->def.stiffness : HUGE_VAL;
-  double stiffness = gains.known ? gains.stiffness / scale : unknown;
+  hapi_pointer_holds holds =
+      hapi_pointer_holds_of(&slot->info, &slot->def, haptic->tick.facts.period, scale);
+  double stiffness = slot->has_device ? holds.stiffness : HUGE_VAL;
+  double asked = hapi_own_force_stiffness(io);
   hap_status status = HAP_OK;
-  if (scale > 0.0 && io->damping > damping) {
+  if (scale > 0.0 && io->damping > holds.damping) {
     status =
         hapi_fail(detail, HAP_SATURATED, "damping %g is cut to the %g that the device can hold",
-                  io->damping, damping);
-    io->damping = damping;
+                  io->damping, holds.damping);
+    io->damping = holds.damping;
   }
-  if (scale > 0.0 && io->stiffness > stiffness && io->kind == HAP_FORCE_CALL) {
+  if (!(scale > 0.0) || asked <= stiffness) {
+    return status;
+  }
+  if (io->kind == HAP_FORCE_CALL) {
     return hapi_fail(
         detail, HAP_ERROR_ARGUMENT,
         "stiffness of the call is %g, and the device can hold %g: let its force change "
         "less with the way",
-        io->stiffness, stiffness);
+        asked, stiffness);
   }
-  if (scale > 0.0 && io->stiffness > stiffness) {
-    status =
-        hapi_fail(detail, HAP_SATURATED, "stiffness %g is cut to the %g that the device can hold",
-                  io->stiffness, stiffness);
+  if (io->kind == HAP_FORCE_SPRING) {
     io->stiffness = stiffness;
+    return hapi_fail(detail, HAP_SATURATED,
+                     "stiffness %g is cut to the %g that the device can hold", asked, stiffness);
   }
+  double strength = io->strength * stiffness / asked;
+  status = hapi_fail(detail, HAP_SATURATED,
+                     "strength %g is cut to %g: on so short a way it would be as steep as a spring "
+                     "of %g, and the device can hold %g",
+                     io->strength, strength, asked, stiffness);
+  io->strength = strength;
   return status;
 }
 

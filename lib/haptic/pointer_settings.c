@@ -33,6 +33,9 @@ static void set_gains(const hapi_haptic *haptic, const hapi_pointer_slot *slot, 
   p->coupling.hold = p->coupling.hold_known ? gains.stiffness / scale : HUGE_VAL;
   p->coupling.stiffness = p->coupling.hold_known ? p->coupling.hold : 0.0;
   p->coupling.damping = p->coupling.hold_known ? gains.damping / scale : 0.0;
+  p->coupling.own = slot->has_device && scale > 0.0
+                        ? hapi_pointer_holds_of(&slot->info, def, haptic->tick.facts.period, scale)
+                        : (hapi_pointer_holds){HUGE_VAL, HUGE_VAL, 0.0};
 }
 
 /* A proxy turns as if it were held at its vertices: by the square of their arm. Not of a long

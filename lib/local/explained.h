@@ -47,7 +47,7 @@ static inline void hapi_contact_explain(hapi_pointer *p, const hapi_local_contac
   hapi_explained *e = &p->guard.change.explained;
   depth += c->feel.special ? c->feel.lift : 0.0;
   double k = c->weight * (p->rigid ? p->coupling.stiffness : hapi_touch_stiffness(c, p));
-  double d = !(depth > 0.0)
+  double d = !hapi_touch_acts(c, depth)
                  ? 0.0
                  : c->weight * (p->proxied ? p->coupling.damping : hapi_touch_damping(c, p));
   double comes = 0.0;

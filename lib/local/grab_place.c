@@ -106,6 +106,7 @@ static void grab_begin(hapi_pointer *p, const hapi_local_body *body, uint32_t sl
   memcpy(hold->asked_turn, g->setup.at_pose != 0 ? g->setup.turn : hold->turn,
          sizeof hold->asked_turn);
   hapi_v3_copy(p->pose.position, hold->at);
+  memcpy(hold->at_turn, p->pose.quat_wxyz, sizeof hold->at_turn);
   g->tag = body->given.tag;
   ++g->holds;
   g->phase = HAPI_GRAB_HOLDS;
@@ -176,9 +177,13 @@ static void place_keep(hapi_grab_hold *hold, const hapi_pointer *p, const hapi_l
 static void place_catch_up(hapi_grab_hold *hold, const hapi_pointer *p, const hapi_local_body *body)
 {
   double way[3];
+  double turn[3];
   hapi_v3_sub(p->pose.position, hold->at, way);
   hapi_quat_unrotate(body->pose.quat_wxyz, way, way);
   hapi_v3_madd(hold->place, p->device.stood, way, hold->place);
+  hapi_proxy_turn_between(hold->at_turn, p->pose.quat_wxyz, turn);
+  hapi_quat_unrotate(body->pose.quat_wxyz, turn, turn);
+  hapi_proxy_turn_by(hold->turn, turn, p->device.stood);
 }
 
 static void place_return(hapi_grab_hold *hold, double seconds)
@@ -299,6 +304,7 @@ static void grab_place(hapi_pointer *p, const hapi_local_body *body, const hapi_
   place_measure(hold, p, body, pull->way, pull->turn);
   hapi_v3_copy(pull->way, hold->way);
   hapi_v3_copy(p->pose.position, hold->at);
+  memcpy(hold->at_turn, p->pose.quat_wxyz, sizeof hold->at_turn);
   pull_bound(p);
   g->ledger.moved = g->share * (pull_energy(pull) - before);
   hapi_pose_point(body->pose.position, body->pose.quat_wxyz, hold->place, pull->point);

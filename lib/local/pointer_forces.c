@@ -6,6 +6,7 @@
 #include "local/explained.h"
 #include "local/pointer_friction.h"
 #include "local/touch_feel.h"
+#include "local/touch_follow.h"
 
 /* A sum that is kept: a force that is not finite, which the guard stops, would stay in it for
  * ever. */
@@ -42,12 +43,15 @@ static inline void turn_tool(hapi_pointer *p, const hapi_local_contact *c)
 }
 
 /* The normal force. */
-static inline void contact_press(hapi_pointer *p, hapi_local_contact *c, const hapi_rows *rows,
-                                 double period, hapi_effect_sample *sample)
+static inline void contact_press(hapi_touches *touches, hapi_pointer *p, hapi_local_contact *c,
+                                 const hapi_rows *rows, double period, hapi_effect_sample *sample)
 {
   if (c->row != HAPI_NO_ROW) {
     double force = rows->solver.rows[c->row].impulse / period;
     hapi_v3_scale(-force, hapi_touch_push(c), c->force);
+  }
+  if (c->feel.sticks) {
+    hapi_touch_feel_note(touches, c, -hapi_v3_dot(c->force, c->normal_now));
   }
   if (c->tool != 0 && p->device.feels_torque) {
     uint64_t begin = hapi_effect_begin(sample);
@@ -87,7 +91,7 @@ static __attribute__((noinline)) void forces_with_friction(
   for (uint32_t i = 0; i < touches->count; ++i) {
     hapi_local_contact *c = &touches->of[i];
     hapi_pointer *p = &pointers->of[c->pointer];
-    contact_press(p, c, rows, facts->period, sample);
+    contact_press(touches, p, c, rows, facts->period, sample);
     if (c->feel.rubs) {
       uint64_t begin = hapi_effect_begin(sample);
       hapi_friction_rub(touches, rows, facts, c, p);
@@ -113,7 +117,7 @@ void hapi_pointer_forces(const hapi_tick_facts *facts, const hapi_pointers *poin
     for (uint32_t i = 0; i < touches->count; ++i) {
       hapi_local_contact *c = &touches->of[i];
       hapi_pointer *p = &pointers->of[c->pointer];
-      contact_press(p, c, rows, facts->period, sample);
+      contact_press(touches, p, c, rows, facts->period, sample);
       contact_give(touches, p, bodies, facts->period, c);
     }
   }

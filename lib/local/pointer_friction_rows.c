@@ -96,7 +96,8 @@ static bool add_friction_row(double period, const hapi_local_contact *contact,
   if (at->pointer->coupling.integration == HAP_INTEGRATION_EXPLICIT) {
     row->normal = -1;
     row->ball = 0;
-    row->lo = row->hi = fmin(row->impulse, contact->feel.mu * normal->hi);
+    double load = normal->hi + period * contact->feel.pull;
+    row->lo = row->hi = fmin(row->impulse, contact->feel.mu * load);
     row->softness = row->target = 0.0;
   } else if (!hapi_spring_soften(row, at->pointer, &p, period)) {
     return false;

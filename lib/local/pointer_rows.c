@@ -213,21 +213,22 @@ static bool pointer_place(const hapi_touches *touches, hapi_local_contact *c, do
 static void push_static(hapi_local_contact *c, const hapi_placed_pointer *at, double speed)
 {
   const hapi_pointer *p = at->pointer;
+  double least = -c->feel.pull;
   double force =
-      at->depth > 0.0
+      hapi_touch_acts(c, at->depth)
           ? at->share * (hapi_touch_stiffness(c, p) * at->depth + hapi_touch_damping(c, p) * speed)
           : 0.0;
-  hapi_v3_scale(force > 0.0 ? -force : 0.0, at->push, c->force);
+  hapi_v3_scale(force > least ? -force : -least, at->push, c->force);
 }
 
-/* Eq. 7 as it stands: the row's impulse is given. */
-static bool row_fix(hapi_row *row, const hapi_pointer_spring *p, double period)
+/* Eq. 7 as it stands: the row's impulse is given. pull: N, at most. */
+static bool row_fix(hapi_row *row, const hapi_pointer_spring *p, double pull, double period)
 {
-  double force = p->depth > 0.0 ? p->k * p->depth + p->d * (p->s - p->w) : 0.0;
-  row->lo = row->hi = force > 0.0 ? period * force : 0.0;
+  double force = p->depth > 0.0 || p->pulls ? p->k * p->depth + p->d * (p->s - p->w) : 0.0;
+  row->lo = row->hi = period * hapi_max(force, -pull);
   row->softness = 0.0;
   row->target = 0.0;
-  return force > 0.0;
+  return force > 0.0 || p->pulls;
 }
 
 /* Of the pointer where it touches. */
@@ -320,9 +321,11 @@ static void add_row(double period, hapi_local_contact *contact, const hapi_place
   uint32_t number = solver->row_count;
   hapi_row *row = &solver->rows[number];
   const hapi_pointer *of = at->pointer;
-  hapi_pointer_spring p = {.k = at->share * hapi_touch_stiffness(contact, of),
-                           .d = at->depth > 0.0 ? at->share * hapi_touch_damping(contact, of) : 0.0,
-                           .depth = at->depth};
+  hapi_pointer_spring p = {
+      .k = at->share * hapi_touch_stiffness(contact, of),
+      .d = hapi_touch_acts(contact, at->depth) ? at->share * hapi_touch_damping(contact, of) : 0.0,
+      .depth = at->depth,
+      .pulls = contact->feel.sticks};
   HAPI_ASSERT_INDEX(number, rows->capacity);
   if (at->pointer->rigid) {
     p.depth *= at->depth > 0.0 ? contact->ramp.share : 1.0;
@@ -330,12 +333,13 @@ static void add_row(double period, hapi_local_contact *contact, const hapi_place
   }
   set_columns(contact, at, row, &p);
   bool pushes = at->pointer->coupling.integration == HAP_INTEGRATION_EXPLICIT
-                    ? row_fix(row, &p, period)
+                    ? row_fix(row, &p, contact->feel.pull, period)
                     : hapi_spring_soften(row, at->pointer, &p, period);
   if (!pushes) {
     hapi_v3_set(contact->force, 0.0, 0.0, 0.0);
     return;
   }
+  row->lo -= p.pulls && row->hi > row->lo ? period * contact->feel.pull : 0.0;
   row->mu = 0.0;
   row->ball = row->round = 0;
   row->single = !at->pointer->proxied;
@@ -386,7 +390,7 @@ static __attribute__((noinline, cold)) void contact_rub(const hapi_tick_facts *f
                                   .point = c->point_now,
                                   .depth = from->depth};
   bool pushes = c->row != HAPI_NO_ROW || hapi_v3_dot(c->force, c->force) > 0.0;
-  if (pushes && (at.pointer->rigid || at.depth > 0.0)) {
+  if ((pushes && (at.pointer->rigid || at.depth > 0.0)) || c->feel.sticks) {
     uint64_t begin = hapi_effect_begin(sample);
     hapi_pointer_friction_rows(facts, bodies, touches, rows, &at);
     hapi_effect_end(sample, HAP_EFFECT_FRICTION, begin);
@@ -412,16 +416,18 @@ static inline void contact_take(const hapi_tick_facts *facts, const hapi_tool_wo
     point_velocity(at, p->proxy.velocity, p->proxy.spin, velocity);
     motion = hapi_v3_dot(at->j, velocity) - at->w;
   }
-  if (!p->rigid && at->depth + NEAR_FLOOR + NEAR_S * motion > 0.0) {
+  if (!p->rigid && (at->depth + NEAR_FLOOR + NEAR_S * motion > 0.0 || c->feel.sticks)) {
     at->pointer->coupling.near_stiffness += c->weight * hapi_touch_stiffness(c, p);
   }
   /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
-  bool comes = at->depth > 0.0 || (at->depth + way > 0.0 && period * motion < 0.25 * size_of(p));
+  bool acts_now = hapi_touch_acts(c, at->depth);
+  bool comes = acts_now || (at->depth + way > 0.0 && period * motion < 0.25 * size_of(p));
   if (comes && at->body != NULL && (at->body->flags & HAPI_BODY_RESTING) != 0 &&
-      (at->depth > 0.0 || at->pointer->proxied)) {
+      (acts_now || at->pointer->proxied)) {
     hapi_body_wake(at->body, rows, period);
   }
-  bool acts = p->rigid ? may_close(tools, period, c, at) : comes && at->share > 0.0;
+  bool acts =
+      p->rigid ? may_close(tools, period, c, at) || c->feel.sticks : comes && at->share > 0.0;
   if (!acts) {
     hapi_v3_set(c->force, 0.0, 0.0, 0.0);
   } else if (hapi_body_responds(at->body) || at->pointer->proxied) {
@@ -469,7 +475,7 @@ static __attribute__((noinline, cold)) void contact_feel(const hapi_tick_facts *
                                                          hapi_local_contact *c,
                                                          hapi_placed_pointer *at)
 {
-  const hapi_feel_place place = {at->pointer, at->body, at->normal, at->point};
+  const hapi_feel_place place = {at->pointer, at->body, at->normal, at->point, at->share};
   hapi_touch_feel_follow(touches, facts, &place, c, &at->depth);
   at->push = c->feel.push;
 }
@@ -506,6 +512,7 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
     }
     if (!placed || c->hidden) {
       hapi_v3_set(c->force, 0.0, 0.0, 0.0);
+      c->feel.sticks = false;
       continue;
     }
     at.push = c->normal_now;

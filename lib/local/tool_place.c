@@ -41,12 +41,17 @@ static bool is_gone(const hapi_local_tool *tool, const hapi_pointers *pointers,
   return !body->live || body->generation != at->generation_b;
 }
 
-static void follow_members(hapi_tool_world *w, double period)
+static void follow_members(const hapi_touches *touches, double period)
 {
+  const hapi_tool_world *w = &touches->tool;
+  const hapi_local_contact *contacts = hapi_touches_of_tools(touches);
   double step = period / COME_S;
   for (uint32_t i = 0; i < w->count; ++i) {
     hapi_local_tool *tool = &w->tools[i];
-    bool presses = w->pairs[tool->pair].depth > 0.0; /* else there is no force to jump */
+    const hapi_touch_feel *feel = &contacts[i].feel;
+    bool sticks = feel->special && touches->feels[feel->pair].hold.sticks;
+    /* Else there is no force to jump. */
+    bool presses = w->pairs[tool->pair].depth > 0.0 || sticks;
     tool->member += (tool->leaving ? -1.0 : 1.0) * (presses ? step : 1.0);
     tool->member = fmin(fmax(tool->member, 0.0), 1.0);
   }
@@ -291,7 +296,7 @@ void hapi_tool_place(hapi_touches *touches, const hapi_pointers *pointers,
     return;
   }
   HAPI_ASSERT(touches->count >= w->count);
-  follow_members(w, facts->period);
+  follow_members(touches, facts->period);
   drop_gone(touches, pointers, bodies);
   hapi_local_contact *contacts = hapi_touches_of_tools(touches);
   for (uint32_t i = 0; i < w->count; ++i) {

@@ -8,6 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "local/pair_feel.h"
 #include "proximity/constrained_ball.h"
 #include "sync/messages.h"
 
@@ -26,6 +27,7 @@ typedef struct hapi_ramp {
   double felt_excess;
   double felt_stiffness; /* N/m */
   double sprung;         /* J in the spring, as it was felt */
+  double drawn;          /* J of it in a spring that pulled */
 } hapi_ramp;
 
 /* Where the anchors of a contact's friction are. */
@@ -74,35 +76,6 @@ typedef struct hapi_touch_shape {
   uint64_t number; /* of the geom, beside its address, which another one may get */
   hapi_told told;  /* of its surface, into hapi_touches.triangles; where it is no shape */
 } hapi_touch_shape;
-
-/* How a contact is felt in this tick. */
-typedef struct hapi_touch_feel {
-  bool rubs;       /* friction is worked out: there is some, or it was asked for */
-  bool special;    /* a surface of its own; else stiffness and damping are the pointer's */
-  uint32_t number; /* as hapi_model_feel.number */
-  uint32_t pair;   /* of a special one: index into the feels */
-  double mu;
-  double stiffness; /* N/m */
-  double damping;   /* N s/m */
-  double lift;      /* m, that the texture is above the geom */
-  double push[3];   /* along which it pushes: the unit normal less the slope of the texture */
-  double lifted;    /* m, by which lift has changed since the tick before, whatever its sign */
-  double turned;    /* the same of push: sum over its parts */
-} hapi_touch_feel;
-
-#define HAPI_FEEL_SAID (-1.0) /* stiffness of a pair that has just come */
-#define HAPI_FEEL_OWN (-2.0)  /* and has pressed with the pointer's up to now */
-
-/* A pointer and a geom with a surface of its own. */
-typedef struct hapi_pair_feel {
-  hapi_model_feel in;
-  uint64_t tick; /* of the state behind: */
-  bool presses;
-  bool pressed;     /* in the tick before */
-  double stiffness; /* N/m: on its way to what is said */
-  const hapi_texture *texture;
-  double lift_share; /* 0..1, of a texture that comes in */
-} hapi_pair_feel;
 
 /* Accelerance of the body, world axes. */
 typedef struct hapi_touch_response {
@@ -246,6 +219,7 @@ typedef struct hapi_touches {
   hapi_pair_feel *feels;     /* capacity.feels */
   hapi_pair_feel *old_feels; /* scratch of adopting */
   uint32_t feel_count;
+  bool magnets;     /* some surface pulls in this tick */
   uint32_t unsound; /* index + 1 of a pointer that touches a texture without height; 0: none */
   hapi_triangle *triangles; /* of the model, each in its body's frame; capacity.triangles */
   uint64_t contact_ticks;   /* in which something pushed; this and the next since start */

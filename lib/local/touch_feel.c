@@ -44,6 +44,8 @@ void hapi_touch_feel_find(const hapi_touches *touches, hapi_local_contact *c)
   }
   c->feel.special = pair != NO_PAIR && touches->feels[pair].in.pointer == c->pointer;
   c->feel.pair = c->feel.special ? pair : 0;
+  c->feel.sticks = c->feel.special && c->feel.sticks;
+  c->feel.pull = c->feel.sticks ? c->feel.pull : 0.0;
 }
 
 void hapi_touch_feel_adopt(hapi_touches *touches, const hapi_feel_told *told, hapi_local_contact *c)

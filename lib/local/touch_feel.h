@@ -5,6 +5,8 @@
 
 /* Contacts with a surface of their own (hapode/surface.h). */
 
+#include <math.h>
+
 #include "base/vec.h"
 #include "local/touch.h"
 #include "pointer/pointer.h"
@@ -34,11 +36,23 @@ static inline const double *hapi_touch_push(const hapi_local_contact *c)
   return c->feel.special ? c->feel.push : c->normal_now;
 }
 
-/* N, the normal force that friction goes by, before friction is added. */
+/* N, the normal force that friction goes by, before friction is added: with what sticks. */
 static inline double hapi_touch_load(const hapi_local_contact *c)
 {
-  return c->feel.special ? hapi_max(-hapi_v3_dot(c->force, c->normal_now), 0.0)
+  return c->feel.special ? hapi_max(c->feel.pull - hapi_v3_dot(c->force, c->normal_now), 0.0)
                          : hapi_v3_norm(c->force);
+}
+
+/* Whether spring and damper act at that depth [m]. */
+static inline bool hapi_touch_acts(const hapi_local_contact *c, double depth)
+{
+  return depth > 0.0 || c->feel.sticks;
+}
+
+/* m, by which the spring is longer or shorter than without a force. */
+static inline double hapi_touch_strain(const hapi_local_contact *c, double depth)
+{
+  return c->feel.sticks ? fabs(depth) : depth;
 }
 
 /* What a message says of a contact. */

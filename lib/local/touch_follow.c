@@ -2,6 +2,8 @@
  * SPDX-License-Identifier: MIT */
 #include "local/touch_follow.h"
 
+#include <math.h>
+
 #include "base/assert.h"
 #include "base/pose.h"
 #include "base/safety.h"
@@ -9,6 +11,7 @@
 #include "local/ball_nearest.h"
 #include "local/pointer_friction.h"
 #include "local/texture.h"
+#include "pointer/own_force.h"
 
 #define FOOT_STEP 1e-6 /* m */
 #define FOOT_MOST 2.0  /* FOOT_STEPs: no surface is so hollow where a ball touches it once */
@@ -24,21 +27,82 @@ static void stiffness_follow(hapi_pair_feel *pair, const hapi_pointer *p, double
     pair->stiffness = pair->pressed ? p->surface.stiffness : wanted;
   }
   double most = period / HAPI_SAFETY_CONTACT_RAMP_S * hapi_max(wanted, pair->stiffness);
-  pair->stiffness = pair->pressed
-                        ? hapi_min(hapi_max(wanted, pair->stiffness - most), pair->stiffness + most)
-                        : wanted;
+  bool loaded = pair->pressed || pair->hold.sticks;
+  pair->stiffness =
+      loaded ? hapi_min(hapi_max(wanted, pair->stiffness - most), pair->stiffness + most) : wanted;
 }
 
 /* Nor does a texture that comes under a contact that presses leap. */
 static void texture_follow(hapi_pair_feel *pair, double period)
 {
   const hapi_texture *wanted = pair->in.feel.texture;
+  bool loaded = pair->pressed || pair->hold.sticks;
   if (wanted != pair->texture) {
     pair->texture = wanted;
-    pair->lift_share = pair->pressed ? 0.0 : 1.0;
+    pair->lift_share = loaded ? 0.0 : 1.0;
   }
   double most = period / HAPI_SAFETY_CONTACT_RAMP_S;
-  pair->lift_share = pair->pressed ? hapi_min(pair->lift_share + most, 1.0) : 1.0;
+  pair->lift_share = loaded ? hapi_min(pair->lift_share + most, 1.0) : 1.0;
+}
+
+#define AT_LIMIT 1e-6 /* of the adhesion: less is rounding */
+
+/* A touch that has pressed sticks from the next tick on. It lets go in the tick after the one in
+ * which the pull came to all that holds, or in which it was too far: then the spring's energy is
+ * lost. So coming and going takes energy from the hand, and never gives any. */
+static void hold_follow(hapi_pair_feel *pair)
+{
+  hapi_pair_hold *hold = &pair->hold;
+  bool can = (pair->in.feel.more & HAPI_FEEL_ADHESION) != 0;
+  bool holds = hold->sticks && hold->taken < (1.0 - AT_LIMIT) * hold->pull &&
+               hold->depth > -HAPI_SAFETY_ADHESION_WAY;
+  hold->sticks = can && (hold->presses || holds);
+  hold->presses = false;
+  hold->pull = hold->taken = 0.0;
+  hold->depth = -HUGE_VAL;
+}
+
+/* A magnet that comes while the hand is in its reach comes in as an own force does. */
+static void magnet_begin(hapi_pair_feel *pair, double gap, double period)
+{
+  hapi_pair_magnet *magnet = &pair->magnet;
+  const hapi_feel *said = &pair->in.feel;
+  double most = period / HAPI_SAFETY_RAMP_IN_S * hapi_max(said->magnet_force, magnet->strength);
+  if (!magnet->known) {
+    magnet->strength = gap < said->magnet_reach ? 0.0 : said->magnet_force;
+    magnet->begins = true;
+  }
+  magnet->strength =
+      hapi_min(hapi_max(said->magnet_force, magnet->strength - most), magnet->strength + most);
+  magnet->any = magnet->known = true;
+  magnet->pull = (hap_wrench){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+}
+
+/* Along the slope of the gap, so that it is the slope of a potential. Points of a hull have their
+ * shares of it. depth: m. */
+static void magnet_pull(hapi_touches *touches, hapi_pair_feel *pair, const hapi_feel_place *at,
+                        const hapi_local_contact *c, double depth, double period)
+{
+  hapi_pair_magnet *magnet = &pair->magnet;
+  const hapi_feel *said = &pair->in.feel;
+  double gap = hapi_max(-depth, 0.0);
+  double force[3];
+  double arm[3];
+  double moment[3];
+  if (!magnet->any) {
+    magnet_begin(pair, gap, period);
+  }
+  double share = at->share * hapi_magnet_share(gap * gap, said->magnet_reach);
+  hapi_v3_scale(share > 0.0 ? -magnet->strength * share * gap : 0.0, c->feel.push, force);
+  hapi_v3_add(magnet->pull.force, force, magnet->pull.force);
+  if (at->pointer->shape.hull != NULL) {
+    hapi_v3_sub(at->point, at->pointer->pose.position, arm);
+    hapi_v3_cross(arm, force, moment);
+    hapi_v3_add(magnet->pull.torque, moment, magnet->pull.torque);
+  }
+  magnet->hardest = HAPI_MAGNET_PEAK * magnet->strength / said->magnet_reach;
+  magnet->body = c->body;
+  touches->magnets = true;
 }
 
 /* Once in each tick. */
@@ -47,7 +111,12 @@ static void pair_follow(hapi_pair_feel *pair, const hapi_tick_facts *facts, cons
   if (pair->tick != facts->tick || pair->stiffness < 0.0) {
     pair->pressed = pair->presses && pair->tick + 1 == facts->tick;
     pair->presses = false;
+    if (pair->tick + 1 != facts->tick) {
+      pair->hold.sticks = pair->hold.presses = false;
+      pair->magnet.known = false;
+    }
     pair->tick = facts->tick;
+    hold_follow(pair);
     stiffness_follow(pair, p, facts->period);
     texture_follow(pair, facts->period);
   }
@@ -192,6 +261,8 @@ void hapi_touch_feel_follow(hapi_touches *touches, const hapi_tick_facts *facts,
   const hapi_pointer *p = at->pointer;
   const hapi_touch_feel before = c->feel;
   pair_follow(pair, facts, p);
+  c->feel.sticks = pair->hold.sticks;
+  c->feel.pull = pair->hold.sticks ? at->share * said->adhesion : 0.0;
   c->feel.stiffness = pair->stiffness;
   c->feel.damping = (said->more & HAPI_FEEL_SPRING) != 0 ? said->damping : p->surface.damping;
   c->feel.mu = contact_slid(touches, facts, c) ? said->mu : said->mu_static;
@@ -206,7 +277,16 @@ void hapi_touch_feel_follow(hapi_touches *touches, const hapi_tick_facts *facts,
     c->feel.turned += fabs(c->feel.push[i] - before.push[i]);
   }
   *io_depth += c->feel.lift;
-  if (*io_depth > 0.0 && !pair->pressed && !pair->presses) {
+  /* What does not give has no depth. */
+  bool pressed = p->rigid && hapi_v3_dot(c->force, at->normal) < 0.0;
+  pair->hold.presses = pair->hold.presses || *io_depth > 0.0 || pressed;
+  pair->hold.depth = hapi_max(pair->hold.depth, *io_depth);
+  if ((said->more & HAPI_FEEL_MAGNET) != 0 && !facts->faulted) {
+    magnet_pull(touches, pair, at, c, *io_depth, facts->period);
+  } else {
+    pair->magnet.known = false;
+  }
+  if (*io_depth > 0.0 && !pair->pressed && !pair->presses && !pair->hold.sticks) {
     material_answer(pair, at, *io_depth, facts->period);
   }
   pair->presses = pair->presses || *io_depth > 0.0;

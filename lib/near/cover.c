@@ -66,13 +66,32 @@ static void note_geom(void *data, dGeomID a, dGeomID b)
   if (!cover->missing) {
     hapi_covered *found = &cover->found[cover->count++];
     found->geom = geom;
+    found->space = cover->asking;
     dGeomGetAABB(geom, found->box);
   }
 }
 
-void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
+/* Of all spaces: the next question may be of others. */
+static void cover_fill(hapi_cover *cover, const hapi_spaces *spaces)
+{
+  cover->count = 0;
+  cover->missing = false;
+  for (uint32_t i = 0; i < spaces->count; ++i) {
+    dSpaceID space = spaces->list[i].space;
+    int64_t begin_ns = hapi_clock_now();
+    dSpaceClean(space); /* ODE does it first of all when it is asked */
+    cover->boxes_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
+    cover->asking = 1u << i;
+    dSpaceCollide2(cover->box_geom, (dGeomID)space, cover, note_geom);
+  }
+  cover->filled = !cover->missing;
+}
+
+void hapi_cover_ask(hapi_cover *cover, const hapi_cover_question *question, void *data,
                     dNearCallback *callback)
 {
+  const hapi_spaces *spaces = question->spaces;
+  dGeomID geom = question->geom;
   dReal box[6];
   dGeomGetAABB(geom, box);
   box_unite(cover->asked, &cover->has_asked, box);
@@ -88,21 +107,20 @@ void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
     dGeomBoxSetLengths(cover->box_geom, length[0], length[1], length[2]);
     dGeomSetPosition(cover->box_geom, middle[0], middle[1], middle[2]);
     dGeomGetAABB(cover->box_geom, cover->box);
-    cover->count = 0;
-    cover->missing = false;
-    int64_t begin_ns = hapi_clock_now();
-    dSpaceClean(space); /* ODE does it first of all when it is asked */
-    cover->boxes_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);
-    dSpaceCollide2(cover->box_geom, (dGeomID)space, cover, note_geom);
-    cover->filled = !cover->missing;
+    cover_fill(cover, spaces);
   }
   if (!cover->filled ||
       !box_holds(cover->box, box)) { /* no memory, or so far out that it is rounded off */
-    dSpaceCollide2(geom, (dGeomID)space, data, callback);
+    for (uint32_t i = 0; i < spaces->count; ++i) {
+      if ((question->mask & 1u << i) != 0) {
+        dSpaceCollide2(geom, (dGeomID)spaces->list[i].space, data, callback);
+      }
+    }
     return;
   }
   for (uint32_t i = 0; i < cover->count; ++i) {
-    if (hapi_boxes_meet(cover->found[i].box, box)) {
+    if ((cover->found[i].space & question->mask) != 0 &&
+        hapi_boxes_meet(cover->found[i].box, box)) {
       callback(data, geom, cover->found[i].geom);
     }
   }

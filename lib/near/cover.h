@@ -10,9 +10,12 @@
 
 #include <ode/ode.h>
 
+#include "world/spaces.h"
+
 typedef struct hapi_covered {
   dReal box[6];
   dGeomID geom;
+  uint32_t space; /* a bit */
 } hapi_covered;
 
 /* Of a round of questions to a space, in which nothing moves. Zeroed, then created. */
@@ -21,10 +24,11 @@ typedef struct hapi_cover {
   bool filled;      /* found holds what is in the box */
   bool has_box;
   bool has_asked;
-  bool missing;   /* no memory for one */
-  dReal box[6];   /* also while it is not filled: what is to be in it */
-  dReal asked[6]; /* all questions of this round */
-  double boxes_s; /* spent in this round on ODE's boxes around what moved */
+  bool missing;    /* no memory for one */
+  dReal box[6];    /* also while it is not filled: what is to be in it */
+  dReal asked[6];  /* all questions of this round */
+  double boxes_s;  /* spent in this round on ODE's boxes around what moved */
+  uint32_t asking; /* bit of the space that is asked */
   hapi_covered *found;
   uint32_t count;
   uint32_t capacity;
@@ -41,9 +45,16 @@ static inline bool hapi_boxes_meet(const double a[6], const double b[6])
 bool hapi_cover_create(hapi_cover *cover);
 void hapi_cover_finish(hapi_cover *cover);
 void hapi_cover_begin(hapi_cover *cover); /* a round: what was moved since counts */
-/* As dSpaceCollide2(geom, space, data, callback), of a geom in no space that collides with all. The
- * callback gets the geoms inside of nested spaces, or such a space to ask itself. */
-void hapi_cover_ask(hapi_cover *cover, dSpaceID space, dGeomID geom, void *data,
+typedef struct hapi_cover_question {
+  const hapi_spaces *spaces;
+  uint32_t mask; /* of the spaces: bits by place */
+  dGeomID geom;
+} hapi_cover_question;
+
+/* As dSpaceCollide2(geom, space, data, callback) with each space of the mask, of a geom in no space
+ * that collides with all. The callback gets the geoms inside of nested spaces, or such a space to
+ * ask itself. */
+void hapi_cover_ask(hapi_cover *cover, const hapi_cover_question *question, void *data,
                     dNearCallback *callback);
 
 #endif

@@ -11,6 +11,7 @@
 #include "base/alloc.h"
 #include "base/pointer_id.h"
 #include "base/pose.h"
+#include "base/safety.h"
 #include "base/vec.h"
 #include "near/near.h"
 
@@ -19,6 +20,8 @@
 #define STIFFNESS_MOST 1e9 /* as of hap_pointer_def */
 #define DAMPING_MOST 1e6
 #define IMPACT_MOST 1000.0 /* N s/m */
+#define PULL_MOST 100.0    /* N, of adhesion and magnets */
+#define MAGNET_LEAST 0.001 /* m */
 #define IMPACT_DECAY_LEAST 10.0
 #define IMPACT_DECAY_MOST 10000.0 /* 1/s */
 #define IMPACT_HZ_LEAST 5.0
@@ -55,7 +58,7 @@ static bool surface_is_good(const hap_surface *s, const hapi_texture *texture)
 {
   return (s->texture == 0 || texture != NULL) && number_is_good(s->stiffness, STIFFNESS_MOST) &&
          number_is_good(s->damping, DAMPING_MOST) && number_is_good(s->friction_static, DBL_MAX) &&
-         number_is_good(s->friction_dynamic, DBL_MAX);
+         number_is_good(s->friction_dynamic, DBL_MAX) && number_is_good(s->adhesion, PULL_MOST);
 }
 
 static bool impact_is_good(const hap_surface *s, double haptic_hz)
@@ -66,8 +69,15 @@ static bool impact_is_good(const hap_surface *s, double haptic_hz)
           s->impact_hz <= fmin(IMPACT_HZ_MOST, 0.25 * haptic_hz));
 }
 
+static bool magnet_is_good(const hap_surface *s, double most)
+{
+  return s->magnet_force == 0.0 || /* then the reach does not count */
+         (number_is_good(s->magnet_force, PULL_MOST) && s->magnet_reach >= MAGNET_LEAST &&
+          s->magnet_reach <= most);
+}
+
 /* As the pointer has it of its own. */
-static void surface_begin(const hapi_state_pointer *pointer, hap_surface *out)
+static void surface_begin(const hapi_state_pointer *pointer, double reach, hap_surface *out)
 {
   memset(out, 0, sizeof *out);
   out->size = sizeof *out;
@@ -77,6 +87,7 @@ static void surface_begin(const hapi_state_pointer *pointer, hap_surface *out)
   out->friction_static = out->friction_dynamic = pointer->friction;
   out->impact_decay = 80.0;
   out->impact_hz = 100.0;
+  out->magnet_reach = reach;
 }
 
 static const hapi_texture *texture_of(const hapi_nearby *nearby, uint32_t number)
@@ -100,6 +111,15 @@ static void feel_read(const hap_surface *s, const hapi_state_pointer *pointer, h
     out->more |= HAPI_FEEL_IMPACT;
     out->impact = (hapi_impact){s->impact_force, s->impact_decay, s->impact_hz};
   }
+  if (s->adhesion > 0.0) {
+    out->more |= HAPI_FEEL_ADHESION;
+    out->adhesion = s->adhesion;
+  }
+  if (s->magnet_force > 0.0) {
+    out->more |= HAPI_FEEL_MAGNET;
+    out->magnet_force = s->magnet_force;
+    out->magnet_reach = s->magnet_reach;
+  }
 }
 
 /* False: the answer was not good. */
@@ -109,10 +129,10 @@ static bool feel_ask(const hapi_nearby *nearby, uint32_t index, dGeomID geom, ha
   const hap_ode_def *ode = &nearby->world->ode;
   const hap_pointer_id id = {hapi_pointer_id_of(pointer->generation, index + 1)};
   hap_surface surface;
-  surface_begin(pointer, &surface);
+  surface_begin(pointer, ode->magnet_reach, &surface);
   ode->pointer_surface(ode->user, id, geom, &surface);
   const hapi_texture *texture = texture_of(nearby, surface.texture);
-  if (!surface_is_good(&surface, texture) ||
+  if (!surface_is_good(&surface, texture) || !magnet_is_good(&surface, ode->magnet_reach) ||
       !impact_is_good(&surface, nearby->cycle->config->haptic_hz)) {
     nearby->cycle->config->report(
         nearby->cycle->config->user, HAP_FAULT_WORLD,
@@ -122,6 +142,8 @@ static bool feel_ask(const hapi_nearby *nearby, uint32_t index, dGeomID geom, ha
   }
   out->touchable = surface.touchable != 0;
   feel_read(&surface, pointer, &out->feel);
+  out->reach = fmax(out->feel.magnet_reach,
+                    (out->feel.more & HAPI_FEEL_ADHESION) != 0 ? HAPI_SAFETY_ADHESION_WAY : 0.0);
   if (texture != NULL) {
     out->feel.texture = texture;
     out->feel.texture_number = surface.texture;
@@ -219,8 +241,7 @@ static void geom_place(const hapi_nearby *nearby, dGeomID geom, hap_pose *out)
   }
 }
 
-static bool feel_find(hapi_nearby *nearby, uint32_t pointer, dGeomID geom, double *out_mu,
-                      uint32_t *out_feel)
+static bool feel_find(hapi_nearby *nearby, uint32_t pointer, dGeomID geom, hapi_feels_said *out)
 {
   uint64_t model = nearby->cycle->model_number + 1;
   uint64_t name = hapi_geom_names_get(&nearby->tools.names, geom, model);
@@ -234,23 +255,22 @@ static bool feel_find(hapi_nearby *nearby, uint32_t pointer, dGeomID geom, doubl
   if (known->feel.texture != NULL) {
     geom_place(nearby, geom, &known->feel.geom);
   }
-  *out_mu = known->feel.mu_static;
-  *out_feel = known->special ? known->number : 0;
+  *out = (hapi_feels_said){.mu = known->feel.mu_static,
+                           .reach = known->reach,
+                           .feel = known->special ? known->number : 0};
+  nearby->neighbors.feels.reach_now = fmax(nearby->neighbors.feels.reach_now, known->reach);
   return known->touchable;
 }
 
-bool hapi_feels_ask(hapi_nearby *nearby, uint32_t pointer, dGeomID geom, double *out_mu,
-                    uint32_t *out_feel)
+bool hapi_feels_ask(hapi_nearby *nearby, uint32_t pointer, dGeomID geom, hapi_feels_said *out)
 {
   bool touchable = true;
-  *out_feel = 0;
+  *out = (hapi_feels_said){.mu = hapi_state_pointers(nearby->cycle->state)[pointer].friction};
   if (nearby->world->ode.pointer_surface != NULL) {
-    touchable = feel_find(nearby, pointer, geom, out_mu, out_feel);
-  } else {
-    *out_mu = hapi_state_pointers(nearby->cycle->state)[pointer].friction;
+    touchable = feel_find(nearby, pointer, geom, out);
   }
   if (hapi_wish_is_off(nearby->cycle->wishes, HAP_EFFECT_FRICTION)) {
-    *out_mu = 0.0;
+    out->mu = 0.0;
   }
   return touchable;
 }

@@ -25,6 +25,7 @@ typedef struct hapi_known_feel {
   bool known;      /* else the application is asked again */
   bool touchable;
   bool special; /* has been other than the pointer's own, and is told to the loop */
+  double reach; /* m, from which on it acts: as much farther away it is of interest */
   hapi_feel feel;
 } hapi_known_feel;
 
@@ -35,6 +36,8 @@ typedef struct hapi_feels {
   uint32_t capacity;
   hapi_index by_pair;
   uint32_t given; /* numbers */
+  double reach; /* m, the largest of the pairs near at the last step, within which all are asked */
+  double reach_now; /* the same of this step, up to now */
   bool said_crowded;
 } hapi_feels;
 
@@ -43,10 +46,15 @@ void hapi_feels_clear(hapi_feels *feels); /* a session begins */
 /* The geom of that number is asked about again; 0: all are. */
 void hapi_feels_renew(hapi_feels *feels, uint64_t geom);
 
-/* *out_mu: the static friction; *out_feel: as hapi_model_contact.feel. False: the pointer goes
- * through the geom. */
-bool hapi_feels_ask(hapi_nearby *nearby, uint32_t pointer, dGeomID geom, double *out_mu,
-                    uint32_t *out_feel);
+/* What is said of a pair. */
+typedef struct hapi_feels_said {
+  double mu;     /* static friction */
+  double reach;  /* as of hapi_known_feel */
+  uint32_t feel; /* as hapi_model_contact.feel */
+} hapi_feels_said;
+
+/* False: the pointer goes through the geom. */
+bool hapi_feels_ask(hapi_nearby *nearby, uint32_t pointer, dGeomID geom, hapi_feels_said *out);
 
 /* Those of the model, to the loop. */
 void hapi_feels_publish(hapi_nearby *nearby, hapi_model *out);

@@ -118,6 +118,8 @@ void hapi_neighbors_collect(hapi_nearby *nearby)
 {
   hapi_neighbors *hood = &nearby->neighbors;
   hood->candidate_count = 0;
+  hood->feels.reach = fmax(hood->feels.reach_now, nearby->world->ode.magnet_reach);
+  hood->feels.reach_now = 0.0;
   if (nearby->cycle->state == NULL) {
     return;
   }
@@ -143,14 +145,16 @@ void hapi_neighbors_collect(hapi_nearby *nearby)
     double speed = hood->fastest + hapi_v3_norm(pointers[i].twist.linear);
     speed += is_tool ? size * hapi_v3_norm(pointers[i].twist.angular) : 0.0;
     double reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s) +
-                   fmin(deepest_touch(nearby, i), DEPTH_MOST);
+                   fmin(deepest_touch(nearby, i), DEPTH_MOST) + hood->feels.reach;
     hood->current_pointer = i;
     hood->current_reach = reach;
     dGeomSphereSetRadius(hood->probe_geom, size + reach);
     dGeomSetPosition(hood->probe_geom, at[0], at[1], at[2]);
     dGeomSetCollideBits(hood->probe_geom, ~0ul);
     dGeomSetCategoryBits(hood->probe_geom, ~0ul);
-    hapi_cover_ask(&hood->cover, nearby->world->ode.space, hood->probe_geom, nearby, collect_geom);
+    const hapi_cover_question question = {&nearby->world->spaces, HAPI_SPACES_ALL,
+                                          hood->probe_geom};
+    hapi_cover_ask(&hood->cover, &question, nearby, collect_geom);
   }
 }
 
@@ -315,8 +319,9 @@ static const hapi_contact_slot *touch_of(hapi_nearby *nearby, const hapi_candida
 
 /* Nearest points for where the pointer will be at the time of the model, which is later than now in
  * model IMPULSE; where that would put its centre inside the body, for where it is now. */
-static bool find_nearest(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_nearest *out)
+static bool find_nearest(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *hit)
 {
+  hapi_nearest *out = &hit->nearest;
   const hapi_state_pointer *pointer =
       &hapi_state_pointers(nearby->cycle->state)[candidate->pointer];
   const hapi_contact_slot *touch = touch_of(nearby, candidate, pointer);
@@ -332,10 +337,12 @@ static bool find_nearest(hapi_nearby *nearby, const hapi_candidate *candidate, h
     found = hapi_geom_nearest(nearby, candidate->geom, pointer->pose.position, radius,
                               candidate->reach, out);
   }
-  return found &&
-         out->distance <=
-             hapi_neighbors_reach(
-                 hapi_neighbors_speed(nearby, candidate->geom, pointer, out->point_b), horizon);
+  if (!found) {
+    return false;
+  }
+  hit->reach = hapi_neighbors_reach(
+      hapi_neighbors_speed(nearby, candidate->geom, pointer, out->point_b), horizon);
+  return out->distance <= hit->reach + nearby->neighbors.feels.reach;
 }
 
 static bool find_hit(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *out)
@@ -343,7 +350,15 @@ static bool find_hit(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_
   out->tool_count = 0;
   return hapi_state_pointers(nearby->cycle->state)[candidate->pointer].is_tool != 0
              ? hapi_tool_find(nearby, candidate, out)
-             : find_nearest(nearby, candidate, &out->nearest);
+             : find_nearest(nearby, candidate, out);
+}
+
+/* What the application says of the pair. False: the pointer does not feel the geom, or it is too
+ * far for that. */
+static bool hit_is_felt(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_hit *io)
+{
+  return hapi_feels_ask(nearby, candidate->pointer, candidate->geom, &io->said) &&
+         io->nearest.distance <= io->reach + io->said.reach;
 }
 
 static int hit_by_distance(const void *a, const void *b)
@@ -502,7 +517,7 @@ static void take_hit(hapi_nearby *nearby, const hapi_hit *hit)
   }
   contact->wanted = true;
   place_contact(nearby, contact, hit, pointer);
-  contact->said = (hapi_contact_said){hit->mu, hit->feel};
+  contact->said = (hapi_contact_said){hit->said.mu, hit->said.feel};
   contact->geom_number =
       hapi_geom_names_get(&nearby->tools.names, hit->geom, nearby->cycle->model_number + 1);
   if (body != NULL) {
@@ -628,8 +643,7 @@ void hapi_neighbors_find(hapi_nearby *nearby)
   for (uint32_t i = 0; i < hood->candidate_count; ++i) {
     hapi_hit *hit = &hood->hits[count];
     const hapi_candidate *near = &hood->candidates[i];
-    if (near->geom != NULL && find_hit(nearby, near, hit) &&
-        hapi_feels_ask(nearby, near->pointer, near->geom, &hit->mu, &hit->feel)) {
+    if (near->geom != NULL && find_hit(nearby, near, hit) && hit_is_felt(nearby, near, hit)) {
       hit->geom = near->geom;
       hit->pointer = near->pointer;
       ++count;

@@ -32,8 +32,8 @@ typedef struct hapi_hit {
   uint32_t tool_count;  /* 0: a sphere */
   hap_pose tool_pose;   /* for which they were found */
   bool hidden;          /* of a sphere: by a nearer one, of the same surface */
-  double mu;            /* of the pair, as the application says */
-  uint32_t feel;        /* as hapi_model_contact.feel */
+  double reach;         /* m, as far as the two may come until the next step */
+  hapi_feels_said said; /* of the pair, by the application */
 } hapi_hit;
 
 typedef struct hapi_neighbors {

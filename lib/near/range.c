@@ -199,6 +199,12 @@ static void add_pair(hapi_nearby *nearby, const hapi_link *link, uint32_t geom_a
   pair->tags = (hapi_pair_tags){.geom_a = turned ? link->other : link->own,
                                 .geom_b = turned ? link->own : link->other};
   pair->surface = link->surface;
+  if (nearby->world->asking->caller.call != NULL) {
+    hapi_near_saids(near)[near->pair_count - 1] =
+        (hapi_near_said){.said = link->said,
+                         .data_a = dGeomGetData(turned ? link->other : link->own),
+                         .data_b = dGeomGetData(turned ? link->own : link->other)};
+  }
 }
 
 /* Index of the triangle's geom in the message; body: that carries it, NULL: the static world.
@@ -440,8 +446,9 @@ static void add_tool_pair(hapi_nearby *nearby, const hapi_hit *hit, uint32_t geo
   pair->tool = take_tool(nearby, hit->pointer);
   pair->geom = geom;
   pair->tag = hit->geom;
-  pair->mu = hit->mu;
-  pair->feel = hit->feel;
+  pair->mu = hit->said.mu;
+  pair->feel = hit->said.feel;
+  pair->reach = hit->said.reach;
 }
 
 static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
@@ -454,7 +461,7 @@ static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
       .geom = hit->geom,
       .at = pointer->pose.position,
       .extent = pointer->extent,
-      .reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s),
+      .reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s) + hit->said.reach,
       .side = hapi_tool_told(nearby, hit->geom, hit->pointer)};
   uint32_t count = hapi_tool_triangles(nearby, &box, nearby->range.number);
   for (uint32_t i = 0; i < count; ++i) {
@@ -617,8 +624,10 @@ void hapi_range_links(hapi_nearby *nearby, const hapi_known_body *known)
                        box[3] - box[2] + 2.0 * reach, box[5] - box[4] + 2.0 * reach);
     dGeomSetPosition(range->links.box_geom, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]),
                      0.5 * (box[4] + box[5]));
-    hapi_cover_ask(&range->links.cover, nearby->world->ode.space, range->links.box_geom, nearby,
-                   link_geom);
+    const hapi_cover_question question = {&nearby->world->spaces,
+                                          hapi_spaces_met(&nearby->world->spaces, geom),
+                                          range->links.box_geom};
+    hapi_cover_ask(&range->links.cover, &question, nearby, link_geom);
   }
 }
 
@@ -932,6 +941,11 @@ void hapi_range_publish(hapi_nearby *nearby)
     hapi_twist_read(handle, &out->twist);
   }
   range->near->model_number = nearby->cycle->model_number;
+  bool asks = nearby->world->asking->caller.call != NULL;
+  range->near->said_count = asks ? range->near->pair_count : 0;
+  if (asks) {
+    hapi_surface_terms_of(nearby->world, nearby->cycle, &range->near->terms);
+  }
   hapi_near_counts *counts = &nearby->counts;
   counts->range_bodies = counts->edge_bodies = counts->measured_bodies = 0;
   counts->range_joints = nearby->range.mechanism.joint_count;

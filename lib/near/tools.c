@@ -25,6 +25,7 @@ typedef struct tool_search {
   hap_pose body_pose; /* of the geom's body */
   bool has_body;
   double margin;
+  double reach;          /* m, of the margin: what speeds ask for */
   hapi_touch_side other; /* the geom, of one shape */
   bool has_shape;
   uint32_t triangles; /* of a mesh, in nearby->meshes.found */
@@ -264,7 +265,8 @@ static void search_begin(tool_search *s, hapi_nearby *nearby, const hapi_tool_at
   double speed = hapi_neighbors_speed(nearby, at->geom, pointer, pointer->pose.position) +
                  pointer->extent * hapi_v3_norm(pointer->twist.angular) +
                  hapi_neighbors_spin(nearby, at->geom, pointer->extent);
-  s->margin = fmin(at->reach, hapi_neighbors_reach(speed, at->horizon));
+  s->reach = hapi_neighbors_reach(speed, at->horizon);
+  s->margin = fmin(at->reach, s->reach + at->more);
   int kind = dGeomGetClass(at->geom);
   if (hapi_geom_has_triangles(at->geom)) {
     const hapi_tool_box box = {at->geom, pose->position, pointer->extent, s->margin, at->side};
@@ -359,6 +361,7 @@ bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_h
                            .key = hapi_tool_geom_key(nearby, candidate->geom, candidate->pointer),
                            .side = hapi_tool_told(nearby, candidate->geom, candidate->pointer),
                            .reach = candidate->reach,
+                           .more = nearby->neighbors.feels.reach,
                            .horizon = nearby->cycle->probe_step_s};
   hap_pose pose = pointer->pose;
   if (!hapi_cycle_steps_to_now(nearby->cycle)) {
@@ -380,6 +383,7 @@ bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_h
   }
   out->tool_first = found.first;
   out->tool_count = found.count;
+  out->reach = s.reach;
   fill_hit(&s, out);
   return true;
 }
@@ -609,10 +613,10 @@ static void slot_place(hapi_nearby *nearby, hapi_contact_slot *slot, const hapi_
   slot->speed = hapi_neighbors_speed(nearby, hit->geom, pointer, slot->point_world);
   slot->stiffness = pointer->stiffness;
   slot->finger_radius = pointer->finger_radius;
-  slot->said = (hapi_contact_said){hit->mu, hit->feel};
+  slot->said = (hapi_contact_said){hit->said.mu, hit->said.feel};
   slot->tool = point->tool;
-  slot->tool.mu = hit->mu;
-  slot->tool.feel = hit->feel;
+  slot->tool.mu = hit->said.mu;
+  slot->tool.feel = hit->said.feel;
   slot->tool.geom = hit->geom;
   slot->tool.at.body_b = slot->body;
   slot->tool.at.generation_b =

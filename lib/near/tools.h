@@ -32,6 +32,7 @@ typedef struct hapi_tool_at {
   const hapi_tool_hull *hull;
   uint64_t key;               /* of the two */
   double reach;               /* m, at most */
+  double more;                /* m, beside what speeds ask for */
   double horizon;             /* s, for which what may come to touch is of interest */
   const hapi_tool_side *side; /* that it touches; NULL: none is known */
 } hapi_tool_at;

@@ -62,22 +62,23 @@ static double depth_of(const hapi_tool_world *tools, hapi_local_contact *c, cons
   return hapi_contact_ramp(c, p, out_depth, period);
 }
 
-/* Eq. 7 along the normal: spring on depth, damper only while in contact, never pulling. Notes for
- * the energy observer how fast the body's motion, which is given, loads the spring, and its
- * energy. */
+/* Eq. 7 along the normal: spring on depth, damper only while in contact, pulling only what sticks.
+ * Notes for the energy observer how fast the body's motion, which is given, loads the spring, and
+ * its energy. */
 static double normal_force(const hapi_tick_facts *facts, hapi_local_contact *c, hapi_pointer *p,
                            const plane *at, double share, double depth)
 {
   double own = 0.0;
-  if (!(depth > 0.0)) {
+  if (!hapi_touch_acts(c, depth)) {
     return 0.0;
   }
   double closing = closing_rate(p, at, &own);
   double force = hapi_touch_stiffness(c, p) * depth + hapi_touch_damping(c, p) * closing;
-  force = force > 0.0 ? share * force : 0.0;
+  double least = -c->feel.pull;
+  force = share * force > least ? share * force : least;
   if (facts->observes) {
     double softer = hapi_touch_softer(c, p);
-    p->guard.force2 += force > 0.0 ? softer * force * force / c->weight : 0.0;
+    p->guard.force2 += force != 0.0 ? softer * force * force / c->weight : 0.0;
     p->guard.power += force * (closing - own);
   }
   return force;
@@ -107,7 +108,7 @@ static void contact_rub(const hapi_tick_facts *facts, const hapi_bodies *bodies,
   double push[4];
   hap_wrench on_body;
   hap_wrench on_hand;
-  double limit = c->feel.mu * at->force;
+  double limit = c->feel.mu * (at->force + c->feel.pull);
   hapi_friction_foot(p, at->normal, at->point, foot);
   const hapi_rub_place place = {p, body, at->normal, foot};
   hapi_friction *f = hapi_friction_begin(touches, bodies, facts->tick, c, &place);
@@ -191,16 +192,19 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
   }
   double share = depth_of(&touches->tool, c, p, &at, facts->period, &depth);
   at.push = at.normal;
+  c->hidden = c->is_hidden;
+  share *= hapi_held_touches_by(p, c);
   if (c->feel.special) {
-    const hapi_feel_place place = {p, at.body, at.normal, at.point};
+    const hapi_feel_place place = {p, at.body, at.normal, at.point, c->hidden ? 0.0 : share};
     hapi_touch_feel_follow(touches, facts, &place, c, &depth);
     at.push = c->feel.push;
   }
-  c->hidden = c->is_hidden;
-  share *= hapi_held_touches_by(p, c);
   double force = c->hidden ? 0.0 : normal_force(facts, c, p, &at, share, depth);
-  if (force == 0.0 || facts->faulted) {
+  if ((force == 0.0 && !(c->feel.pull > 0.0)) || facts->faulted) {
     return;
+  }
+  if (c->feel.sticks) {
+    hapi_touch_feel_note(touches, c, force);
   }
   at.force = force;
   hapi_v3_scale(-force, at.push, c->force);

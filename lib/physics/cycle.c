@@ -229,16 +229,18 @@ void hapi_physics_test(hapi_physics *physics)
   }
 }
 
-/* It simulates in the hand's time alone, with the step as created, and knows of contacts alone. */
-static bool may_look_back(const hapi_cycle *cycle)
+/* It simulates in the hand's time alone, with the step as created, and knows of contacts alone:
+ * those with the surface of their pair. */
+static bool may_look_back(const hapi_physics *physics)
 {
-  return !hapi_state_holds(cycle->state) && cycle->time_scale == 1.0 && cycle->step_scale == 1.0 &&
-         cycle->steady;
+  const hapi_cycle *cycle = &physics->cycle;
+  return !hapi_world_asks(physics->world.asking) && !hapi_state_holds(cycle->state) &&
+         cycle->time_scale == 1.0 && cycle->step_scale == 1.0 && cycle->steady;
 }
 
 static void look_back(hapi_physics *physics, int64_t now_ns)
 {
-  if (!may_look_back(&physics->cycle)) {
+  if (!may_look_back(physics)) {
     hapi_lookback_reset(&physics->lookback);
     return;
   }
@@ -340,7 +342,7 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   seconds[4] = stopwatch_lap(&watch);
   look_back(physics, now_ns);
   double looked_s = seconds[2] = stopwatch_lap(&watch);
-  if (physics->cycle.model == HAP_MODEL_IMPULSE && may_look_back(&physics->cycle)) {
+  if (physics->cycle.model == HAP_MODEL_IMPULSE && may_look_back(physics)) {
     hapi_lookback_open(&physics->lookback, now_ns);
   }
   hapi_reconcile_push(&physics->account);
@@ -364,11 +366,11 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_physics_test(physics);
   hapi_joint_probes(&physics->probe, &physics->world.joints, physics->near.range.number);
   seconds[2] += stopwatch_lap(&watch);
-  if (may_look_back(&physics->cycle)) {
+  if (may_look_back(physics)) {
     hapi_lookback_note(&physics->lookback);
   }
   sync_out(physics, now_ns, next_ns);
-  if (physics->cycle.model != HAP_MODEL_IMPULSE && may_look_back(&physics->cycle)) {
+  if (physics->cycle.model != HAP_MODEL_IMPULSE && may_look_back(physics)) {
     hapi_lookback_open(&physics->lookback, now_ns);
   }
   hapi_dial_leave(&physics->dial, physics->world.ode.world);

@@ -156,6 +156,38 @@ void hapi_physics_forget_geom(hapi_physics *physics, const void *geom)
   hapi_lookback_forget_geom(&physics->lookback, (dGeomID)(uintptr_t)geom);
 }
 
+hap_status hapi_physics_add_space(hapi_physics *physics, struct dxSpace *space, uint32_t pairs)
+{
+  (void)hapi_spaces_look(&physics->world.spaces); /* one that was destroyed makes room */
+  return hapi_spaces_add(&physics->world.spaces, space, pairs);
+}
+
+static void space_forget(hapi_physics *physics, dSpaceID space)
+{
+  int count = dSpaceGetNumGeoms(space);
+  for (int i = 0; i < count; ++i) {
+    dGeomID geom = dSpaceGetGeom(space, i);
+    if (dGeomIsSpace(geom)) {
+      space_forget(physics, (dSpaceID)geom);
+      continue;
+    }
+    hapi_physics_forget_geom(physics, geom);
+    if (dGeomGetBody(geom) != NULL) {
+      (void)hapi_physics_forget(physics, dGeomGetBody(geom)); /* another geom of it came first */
+    }
+  }
+}
+
+hap_status hapi_physics_remove_space(hapi_physics *physics, struct dxSpace *space)
+{
+  (void)hapi_spaces_look(&physics->world.spaces); /* one that is no more cannot be walked through */
+  if (!hapi_spaces_remove(&physics->world.spaces, space)) {
+    return HAP_ERROR_NOT_FOUND;
+  }
+  space_forget(physics, space);
+  return HAP_OK;
+}
+
 void hapi_physics_surface_changed(hapi_physics *physics, const void *geom)
 {
   hapi_neighbors_forget_feel(&physics->near, (dGeomID)(uintptr_t)geom);

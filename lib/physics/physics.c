@@ -84,6 +84,20 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
     hapi_physics_destroy(physics);
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the physics side");
   }
+  hap_status taken =
+      hapi_spaces_add(&physics->world.spaces, ode->space, HAP_SPACE_INSIDE | HAP_SPACE_OTHERS);
+  if (taken < HAP_OK) {
+    hapi_physics_destroy(physics);
+    return hapi_fail(detail, taken,
+                     taken == HAP_ERROR_STATE
+                         ? "the space already has a session: destroy that one first, or make a "
+                           "space for each world"
+                         : "no memory for the physics side");
+  }
+  physics->world.asking->caller = (hapi_contact_caller){.call = ode->contact,
+                                                        .user = ode->user,
+                                                        .report = config->report,
+                                                        .report_user = config->user};
   hap_status status = check_world(physics, detail);
   if (status < HAP_OK) {
     hapi_physics_destroy(physics);
@@ -91,6 +105,16 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   }
   *out = physics;
   return HAP_OK;
+}
+
+const hapi_contact_caller *hapi_physics_caller(const hapi_physics *physics)
+{
+  return &physics->world.asking->caller;
+}
+
+bool hapi_physics_asks(const hapi_physics *physics)
+{
+  return hapi_physics_caller(physics)->call != NULL;
 }
 
 void hapi_physics_destroy(hapi_physics *physics)
@@ -177,6 +201,7 @@ static void physics_prepare(hapi_physics *physics)
   physics->cycle.model_number = 0;
   physics->world_faulty = false;
   physics->world.bodies.said_lost = false;
+  physics->world.said_space = false;
   physics->world.islands_threads =
       dWorldGetStepIslandsProcessingMaxThreadCount(physics->world.ode.world);
   if (physics->config.lockstep || physics->tape.tape != NULL) {

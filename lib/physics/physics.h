@@ -19,13 +19,19 @@
 #include "world/config.h"
 
 struct hap_ode_def;
-struct dxBody; /* dBodyID is a pointer to it */
+struct dxBody;  /* dBodyID is a pointer to it */
+struct dxSpace; /* dSpaceID */
+struct hapi_contact_caller;
 
 typedef struct hapi_physics hapi_physics;
 
 hap_status hapi_physics_create(const hapi_physics_config *config, const struct hap_ode_def *ode,
                                hapi_physics **out, hap_detail *detail);
 void hapi_physics_destroy(hapi_physics *physics); /* NULL allowed; ended before */
+
+/* [any] Who is asked about contacts; it does not change. */
+const struct hapi_contact_caller *hapi_physics_caller(const hapi_physics *physics);
+bool hapi_physics_asks(const hapi_physics *physics); /* whether there is anybody */
 
 /* [control] Takes the world over and builds the first local model; *start_ns is the time for which
  * it holds: 0 in lockstep, else now. */
@@ -75,6 +81,8 @@ hap_status hapi_physics_trace_bodies(hapi_physics *physics, struct dxBody *const
                                      size_t count);
 void hapi_physics_forget_geom(hapi_physics *physics, const void *geom);
 void hapi_physics_surface_changed(hapi_physics *physics, const void *geom); /* NULL: of all */
+hap_status hapi_physics_add_space(hapi_physics *physics, struct dxSpace *space, uint32_t pairs);
+hap_status hapi_physics_remove_space(hapi_physics *physics, struct dxSpace *space);
 #define HAPI_ALL_KNOWN SIZE_MAX
 
 /* [any] At the time drawn for time_ns; newest of all; roles. HAP_ERROR_NOT_FOUND: the body at

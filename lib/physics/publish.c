@@ -620,7 +620,10 @@ void hapi_physics_renew_model(hapi_physics *physics)
   for (uint32_t i = 0; i < p.slots->body_high; ++i) {
     physics->near.slots.bodies[i].alive = false;
   }
-  space_note_living(&physics->world.bodies, &physics->near.slots, physics->world.ode.space);
+  const hapi_spaces *spaces = &physics->world.spaces;
+  for (uint32_t i = 0; i < spaces->count; ++i) {
+    space_note_living(&physics->world.bodies, &physics->near.slots, spaces->list[i].space);
+  }
   for (uint32_t i = 0; i < model->body_count; ++i) {
     body_renew(&p, model, &hapi_model_bodies(model)[i]);
   }

@@ -7,6 +7,7 @@
 #include "base/log.h"
 #include "near/neighbors.h"
 #include "physics/tape_cycle.h"
+#include "record/verdict_cells.h"
 
 /* Physics' part of a recording: what a cycle has from outside, and a hash of the local model
  * that it made of it. */
@@ -113,7 +114,9 @@ static void describe_world(const hapi_world *world, hapi_cell *out)
       ++out->u[HAPI_WORLD_BODIES];
     }
   }
-  hash_space(world->ode.space, out);
+  for (uint32_t i = 0; i < world->spaces.count; ++i) {
+    hash_space(world->spaces.list[i].space, out);
+  }
 }
 
 static hap_status other_world(const hapi_cell *there, const hapi_cell *here, hap_detail *detail)
@@ -138,6 +141,11 @@ hap_status hapi_tape_world(hapi_taping *taping, const hapi_world *world, hapi_wa
                            hap_detail *detail)
 {
   hapi_cell here = {0};
+  taping->asking = world->asking;
+  taping->asking->mode = hapi_tape_plays(taping->tape)     ? HAPI_ASKING_PLAYS
+                         : hapi_tape_records(taping->tape) ? HAPI_ASKING_RECORDS
+                                                           : HAPI_ASKING_ONLY;
+  hapi_verdicts_clear(&taping->asking->verdicts);
   if (taping->tape == NULL) {
     return HAP_OK;
   }
@@ -156,7 +164,7 @@ hap_status hapi_tape_world(hapi_taping *taping, const hapi_world *world, hapi_wa
                                          << 32;
     return HAP_OK;
   }
-  taping->read = hapi_tape_get(taping->tape, HAPI_CELL_WORLD, 0);
+  taping->read = hapi_verdicts_get(&taping->asking->verdicts, taping->tape, HAPI_CELL_WORLD);
   if (taping->read->u[HAPI_WORLD_HASH] != here.u[HAPI_WORLD_HASH]) {
     return other_world(taping->read, &here, detail);
   }
@@ -217,6 +225,13 @@ static uint64_t hash_feel(uint64_t hash, const hapi_model_feel *of)
                            feel->impact.force, feel->impact.decay, feel->impact.hz};
   hash = hapi_hash_word(hash, ((uint64_t)of->number << 32) | feel->more);
   hash = hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
+  if ((feel->more & HAPI_FEEL_ADHESION) != 0) { /* recordings of earlier versions have none */
+    hash = hapi_hash_doubles(hash, &feel->adhesion, 1);
+  }
+  if ((feel->more & HAPI_FEEL_MAGNET) != 0) {
+    hash = hapi_hash_doubles(hash, &feel->magnet_force, 1);
+    hash = hapi_hash_doubles(hash, &feel->magnet_reach, 1);
+  }
   hash = hapi_hash_word(hash, feel->texture_number);
   hash = hapi_hash_doubles(hash, feel->geom.position, 3);
   return hapi_hash_doubles(hash, feel->geom.quat_wxyz, 4);
@@ -289,6 +304,7 @@ static void put_end(hapi_taping *taping, uint64_t number)
   cell->u[HAPI_CYCLED_MODEL] = number;
   cell->u[HAPI_CYCLED_HASH] = taping->model_hash;
   cell->i[HAPI_CYCLED_SENT] = taping->sent_ns;
+  hapi_verdicts_put(&taping->asking->verdicts, taping->tape, cell);
   note_commit(taping);
 }
 
@@ -321,6 +337,7 @@ void hapi_tape_started(hapi_taping *taping, const hapi_cycle *cycle)
   HAPI_ASSERT(!taping->cycling);
   if (hapi_tape_records(taping->tape)) {
     taping->note->u[HAPI_WORLD_MODEL_HASH] = taping->model_hash;
+    hapi_verdicts_put(&taping->asking->verdicts, taping->tape, taping->note);
     note_commit(taping);
   } else if (hapi_tape_plays(taping->tape)) {
     compare_model(taping, cycle->model_number, taping->read->u[HAPI_WORLD_MODEL_HASH]);
@@ -331,6 +348,7 @@ void hapi_tape_started(hapi_taping *taping, const hapi_cycle *cycle)
 
 void hapi_tape_cycle(hapi_taping *taping, hapi_wanted *wanted, int64_t now_ns, int64_t next_ns)
 {
+  hapi_verdicts_clear(&taping->asking->verdicts);
   taping->model_hash = 0;
   taping->model_next = (uint16_t)atomic_load(&wanted->model);
   taping->cycling = true;
@@ -345,7 +363,7 @@ void hapi_tape_cycle(hapi_taping *taping, hapi_wanted *wanted, int64_t now_ns, i
     taping->note->u[HAPI_CYCLE_DROPPED] = taping->dropped_unrecorded & LOW_HALF;
   } else if (hapi_tape_plays(taping->tape)) {
     taping->read = hapi_tape_get(taping->tape, HAPI_CELL_CYCLE, 0);
-    taping->read_end = hapi_tape_get(taping->tape, HAPI_CELL_CYCLED, 0);
+    taping->read_end = hapi_verdicts_get(&taping->asking->verdicts, taping->tape, HAPI_CELL_CYCLED);
     dRandSetSeed((unsigned long)taping->read->u[HAPI_CYCLE_SEED]);
     taping->played_missed += taping->read->u[HAPI_CYCLE_MISSED] & LOW_HALF;
     taping->played_dropped += taping->read->u[HAPI_CYCLE_DROPPED] & LOW_HALF;

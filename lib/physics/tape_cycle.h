@@ -28,6 +28,7 @@ typedef struct hapi_taping {
   uint64_t played_dropped;     /* replay: steps of frames, likewise */
   uint16_t model_next;         /* hap_model wanted at the end of the cycle */
   bool cycling;                /* not at the start */
+  hapi_world_asking *asking;   /* of the world */
 } hapi_taping;
 
 /* What other threads asked for, from the next cycle on. */

@@ -28,9 +28,10 @@ typedef struct hapi_grab_hold {
   double turn[4];
   double asked[3]; /* on its way to: */
   double asked_turn[4];
-  double at[3];   /* m, of the pointer at the last tick */
-  double spin[3]; /* rad/s, likewise */
-  double way[3];  /* m, from the body's place to the pointer, then */
+  double at[3];      /* m, of the pointer at the last tick */
+  double at_turn[4]; /* likewise */
+  double spin[3];    /* rad/s, likewise */
+  double way[3];     /* m, from the body's place to the pointer, then */
 } hapi_grab_hold;
 
 /* Spring and damper in this tick, and what came of them. */

@@ -21,8 +21,6 @@
  *   vibration  strength x envelope x sine, of the time alone: a late tick does not shift it
  *   call       what the application said in this tick */
 
-#define MAGNET_PEAK 2.598076211353316 /* 1 / (u (1 - u^2)) where that is greatest: 3 sqrt(3) / 2 */
-
 /* Of x whole turns, to 1e-12. The tick has no mathematics library: a replay on another machine has
  * the same digits. */
 static double sine_of_turns(double x)
@@ -103,8 +101,7 @@ static void own_find(const hapi_own_source *source, const hapi_pointer *p, own_p
 
 static void magnet_force(const hapi_force_setup *setup, const double way[3], double out[3])
 {
-  double u2 = hapi_v3_dot(way, way) / (setup->range * setup->range);
-  double share = u2 < 1.0 ? MAGNET_PEAK * (1.0 - u2) / setup->range : 0.0;
+  double share = hapi_magnet_share(hapi_v3_dot(way, way), setup->range);
   hapi_v3_scale(-setup->strength * share, way, out);
 }
 
@@ -217,7 +214,7 @@ double hapi_own_force_stiffness(const hapi_force_setup *setup)
     case HAP_FORCE_CALL:
       return setup->stiffness;
     case HAP_FORCE_MAGNET: /* at its middle */
-      return MAGNET_PEAK * setup->strength / setup->range;
+      return HAPI_MAGNET_PEAK * setup->strength / setup->range;
     case HAP_FORCE_DETENTS:
       return 2.0 * M_PI * setup->strength / setup->pitch;
     case HAP_FORCE_CONSTANT:

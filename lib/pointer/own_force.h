@@ -10,6 +10,16 @@
 #include "base/force_setup.h"
 #include "pointer/pointer.h"
 
+#define HAPI_MAGNET_PEAK \
+  2.598076211353316 /* 1 / (u (1 - u^2)) where that is greatest: 3 sqrt(3) / 2 */
+
+/* 1/m: what of a magnet's strength acts for each metre of the way to it. */
+static inline double hapi_magnet_share(double way2, double range)
+{
+  double u2 = way2 / (range * range);
+  return u2 < 1.0 ? HAPI_MAGNET_PEAK * (1.0 - u2) / range : 0.0;
+}
+
 /* A body to which a force is bound: its frame, and how that moves. */
 typedef struct hapi_own_frame {
   hap_pose pose;

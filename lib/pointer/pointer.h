@@ -15,6 +15,7 @@
 
 #include "pointer/declared.h"
 #include "pointer/grab.h"
+#include "pointer/holds.h"
 #include "pointer/swings.h"
 #include "pointer/transient.h"
 #include "pointer/velocity.h"
@@ -120,6 +121,7 @@ typedef struct hapi_pointer_coupling {
   double idle_s;            /* s, that a proxy of coupling AUTO has touched nothing */
   double near_stiffness;    /* N/m, sum over the contacts near the pointer, as they are found */
   double contact_stiffness; /* N/m, the same of the last tick, whole */
+  hapi_pointer_holds own;
 } hapi_pointer_coupling;
 
 /* Where the device's frame is in the world at time_ns, and how it goes on from there. */

@@ -59,7 +59,11 @@ typedef enum hapi_cell_kind {
              word: effects wished for, at the start */
   HAPI_CELL_CYCLE = 17,  /* hapi_cycle_word; word: edits that were run; flags: hap_model wanted */
   HAPI_CELL_CYCLED = 18, /* hapi_cycled_word; flags: hap_model wanted then, of the next cycle */
-  /* contact, packets of one cell */
+  /* behind a WORLD, CYCLED or PASS of index 1, with as many VERDICT cells behind it as its word
+     says: record/verdict_cells.h */
+  HAPI_CELL_VERDICTS = 19, /* hapi_verdicts_word */
+  HAPI_CELL_VERDICT = 20,
+  /* contact, each a packet with its verdicts */
   HAPI_CELL_PASS = 24 /* hapi_pass_word */
 } hapi_cell_kind;
 
@@ -141,6 +145,13 @@ typedef enum hapi_pass_word {
   HAPI_PASS_HASH = 4
 } hapi_pass_word;
 
+#define HAPI_VERDICTS_MOST (1u << 19) /* cells: a reader has room for twice as many */
+
+typedef enum hapi_verdicts_word {
+  HAPI_VERDICTS_COUNT = 0,
+  HAPI_VERDICTS_OWN = 1 /* surfaces */
+} hapi_verdicts_word;
+
 enum {
   /* of TICK */
   HAPI_CELL_RESET = 1,     /* the fault was reset */
@@ -157,7 +168,8 @@ enum {
 
 typedef struct hapi_cell {
   uint8_t kind;
-  uint8_t index;  /* of a pointer; TICK: hap_fault that another thread wants latched */
+  uint8_t index;  /* of a pointer; TICK: hap_fault that another thread wants latched; WORLD, CYCLED,
+                     PASS: 1: verdicts follow */
   uint16_t flags; /* HAPI_CELL_* */
   uint32_t word;  /* BEGIN, TICK: cells that follow in the packet */
   union {

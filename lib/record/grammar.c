@@ -116,12 +116,39 @@ static const char *take_contact(hapi_grammar *g, const hapi_cell *cell)
   return NULL;
 }
 
+/* Behind a cell that verdicts follow. */
+static bool verdicts_expected(const hapi_grammar *g, hapi_stream stream)
+{
+  return g->judged[stream] || g->verdicts[stream] > 0;
+}
+
+static const char *take_verdicts(hapi_grammar *g, hapi_stream stream, const hapi_cell *cell)
+{
+  if (cell->kind != (g->judged[stream] ? HAPI_CELL_VERDICTS : HAPI_CELL_VERDICT)) {
+    return "another cell where a verdict should be";
+  }
+  if (g->judged[stream] && cell->word > HAPI_VERDICTS_MOST) {
+    return "verdicts without end";
+  }
+  g->verdicts[stream] = g->judged[stream] ? cell->word : g->verdicts[stream] - 1;
+  g->judged[stream] = false;
+  return NULL;
+}
+
+static const char *take_first(hapi_grammar *g, hapi_stream stream, const hapi_cell *cell)
+{
+  if (stream == HAPI_STREAM_HAPTIC) {
+    return take_haptic(g, cell);
+  }
+  g->judged[stream] = cell->kind != HAPI_CELL_CYCLE && cell->index == 1;
+  return stream == HAPI_STREAM_PHYSICS ? take_physics(g, cell) : take_contact(g, cell);
+}
+
 const char *hapi_grammar_take(hapi_grammar *grammar, hapi_stream stream, const hapi_cell *cell)
 {
   HAPI_ASSERT_INDEX(stream, HAPI_STREAMS);
-  const char *wrong = stream == HAPI_STREAM_HAPTIC    ? take_haptic(grammar, cell)
-                      : stream == HAPI_STREAM_PHYSICS ? take_physics(grammar, cell)
-                                                      : take_contact(grammar, cell);
+  const char *wrong = verdicts_expected(grammar, stream) ? take_verdicts(grammar, stream, cell)
+                                                         : take_first(grammar, stream, cell);
   grammar->begun[stream] = true;
   ++grammar->cells[stream];
   return wrong;

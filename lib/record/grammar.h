@@ -13,7 +13,9 @@
 typedef struct hapi_grammar {
   bool begun[HAPI_STREAMS];
   uint64_t cells[HAPI_STREAMS];
-  uint32_t left; /* haptic: cells that the packet lacks */
+  uint32_t left;                   /* haptic: cells that the packet lacks */
+  bool judged[HAPI_STREAMS];       /* a VERDICTS is the next one */
+  uint32_t verdicts[HAPI_STREAMS]; /* VERDICT cells that are to follow */
   uint64_t ticks;
   uint64_t window;
   int64_t start_ns; /* tick 0 */

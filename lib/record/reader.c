@@ -414,6 +414,16 @@ static bool make_room(cell_queue *q, uint32_t count)
   return true;
 }
 
+/* More than there are, if the last one of those that tell is not there. */
+static uint32_t packet_with_verdicts(const hapi_cell *cells, uint32_t count)
+{
+  uint32_t size = cells->kind == HAPI_CELL_CYCLE ? 2 : 1;
+  if (count >= size && cells[size - 1].index == 1) {
+    return count > size ? size + 1 + cells[size].word : size + 1;
+  }
+  return size;
+}
+
 /* Cells of the packet at the front; 0: nothing is there. */
 static uint32_t packet_size(const hapi_reader *reader, hapi_stream stream)
 {
@@ -423,7 +433,7 @@ static uint32_t packet_size(const hapi_reader *reader, hapi_stream stream)
     return 0;
   }
   const hapi_cell *head = &q->cells[q->first];
-  return stream == HAPI_STREAM_HAPTIC ? 1 + head->word : head->kind == HAPI_CELL_CYCLE ? 2 : 1;
+  return stream == HAPI_STREAM_HAPTIC ? 1 + head->word : packet_with_verdicts(head, q->count);
 }
 
 static bool whole_packet(const hapi_reader *reader, hapi_stream stream)
@@ -475,9 +485,8 @@ hap_status hapi_reader_glance(hapi_reader *reader, hapi_stream stream, const hap
          reader->queues[HAPI_STREAM_HAPTIC].count < GLANCE) {
     status = read_on(reader, detail);
   }
-  uint32_t size = packet_size(reader, stream);
   *out = q->count > 0 ? q->cells + q->first : NULL;
-  *out_count = size < q->count ? size : q->count;
+  *out_count = whole_packet(reader, stream) ? packet_size(reader, stream) : 0;
   return status < HAP_OK ? status : HAP_OK;
 }
 

@@ -30,7 +30,7 @@ const hapi_grammar *hapi_reader_whole(const hapi_reader *reader); /* after all o
 hap_status hapi_reader_peek(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,
                             uint32_t *out_count, hap_detail *detail);
 /* The same, but reads on only until the loop's cells pile up. *out is NULL when no packet was
- * found; *out_count is 1 instead of 2 when the end of a physics step was not found. */
+ * found; *out_count is 0 when only its begin was found. */
 hap_status hapi_reader_glance(hapi_reader *reader, hapi_stream stream, const hapi_cell **out,
                               uint32_t *out_count, hap_detail *detail);
 void hapi_reader_pop(hapi_reader *reader, hapi_stream stream);

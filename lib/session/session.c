@@ -46,7 +46,21 @@ hap_status hapi_session_fail(const hap_session *session, hap_status status, cons
 hap_status hapi_session_note(const hap_session *session, hap_status status,
                              const hap_detail *detail)
 {
-  return status < HAP_OK ? hapi_session_fail(session, status, "%s", detail->text) : status;
+  return status < HAP_OK || status == HAP_SATURATED
+             ? hapi_session_fail(session, status, "%s", detail->text)
+             : status;
+}
+
+hap_status hapi_session_find_body(hap_session *session, void *body, uint64_t *out_birth,
+                                  hap_detail *detail)
+{
+  if (hapi_physics_birth(session->physics, body, out_birth) >= HAP_OK) {
+    return HAP_OK;
+  }
+  return hapi_fail(detail, HAP_ERROR_NOT_FOUND,
+                   "the body is not known to the session: it was destroyed or forgotten, or it has "
+                   "neither geom nor joint and was not adopted (hap_session_adopt_body), or it is "
+                   "new, and the next step will see it");
 }
 
 hap_status hapi_session_say(const hap_session *session, hap_status status, const char *call)

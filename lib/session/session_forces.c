@@ -201,18 +201,6 @@ static void setup_fill(const hap_force_def *d, hapi_force_setup *out)
   }
 }
 
-static hap_status body_find(hap_session *session, void *body, uint64_t *out, hap_detail *detail)
-{
-  *out = 0;
-  if (body == NULL || hapi_physics_birth(session->physics, body, out) >= HAP_OK) {
-    return HAP_OK;
-  }
-  return hapi_fail(detail, HAP_ERROR_NOT_FOUND,
-                   "the body is not known to the session: it was destroyed or forgotten, or it has "
-                   "neither geom nor joint and was not adopted (hap_session_adopt_body), or it is "
-                   "new, and the next step will see it");
-}
-
 static hap_status force_put(hap_session *session, hap_pointer_id pointer, hap_force_id *io,
                             const hap_force_def *def)
 {
@@ -228,12 +216,13 @@ static hap_status force_put(hap_session *session, hap_pointer_id pointer, hap_fo
         .samples = d.vibration.samples,
         .call = {d.call, d.user, (int64_t)(1e9 * share / session->def.haptic_hz)}};
     setup_fill(&d, &setup);
-    status = body_find(session, d.body, &setup.body, &detail);
+    status =
+        d.body != NULL ? hapi_session_find_body(session, d.body, &setup.body, &detail) : status;
     status = status >= HAP_OK
                  ? hapi_haptic_put_force(session->haptic, pointer, io, &setup, &extra, &detail)
                  : status;
   }
-  return status == HAP_OK ? status : hapi_session_fail(session, status, "%s", detail.text);
+  return hapi_session_note(session, status, &detail);
 }
 
 hap_status hap_pointer_force_add(hap_session *session, hap_pointer_id pointer,

@@ -94,12 +94,9 @@ hap_status hap_pointer_attach(hap_session *session, hap_pointer_id pointer, void
                              "the session does not run: hap_session_start comes first");
   }
   HAPI_TRY(model_check(session));
-  if (hapi_physics_birth(session->physics, body, &birth) < HAP_OK) {
-    return hapi_session_fail(
-        session, HAP_ERROR_NOT_FOUND,
-        "the body is not known to the session: it was destroyed or forgotten, or "
-        "it has neither geom nor joint and was not adopted "
-        "(hap_session_adopt_body)");
+  status = hapi_session_find_body(session, body, &birth, &detail);
+  if (status < HAP_OK) {
+    return hapi_session_note(session, status, &detail);
   }
   setup_fill(&d, birth, &setup);
   status = hapi_haptic_grab(session->haptic, pointer, &setup, &detail);

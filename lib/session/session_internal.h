@@ -68,9 +68,13 @@ struct hap_session {
 /* Notes the text of an error on the session and gives back status. */
 hap_status hapi_session_fail(const hap_session *session, hap_status status, const char *format, ...)
     HAP_PRINTF(3, 4);
-/* The same with the detail of a failed check; nothing where the status is none. */
+/* The same with the detail of a failed check, or of what was cut; nothing where the status is
+ * none. */
 hap_status hapi_session_note(const hap_session *session, hap_status status,
                              const hap_detail *detail);
+/* The birth of a body, a dBodyID. HAP_ERROR_NOT_FOUND: the session does not know it. */
+hap_status hapi_session_find_body(hap_session *session, void *body, uint64_t *out_birth,
+                                  hap_detail *detail);
 /* The text of an error that has none of its own: else it would be that of an older one. call: the
  * function's name. Where session is NULL, and for what is no error, nothing. */
 hap_status hapi_session_say(const hap_session *session, hap_status status, const char *call);

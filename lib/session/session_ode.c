@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "base/plausible.h"
 #include "session/session_internal.h"
+#include "world/contact_call.h"
 
 /* What is kept of the last ticks for drawing: as long as poses.c may lie behind and more, in rows
  * of at most 16 MB, which are some ticks apart where that is not enough for all. */
@@ -34,6 +35,7 @@ static hap_status ode_check(const hap_ode_def *def, hap_detail *detail)
 {
   const hapi_number_rule rules[] = {
       HAPI_RULE(def, max_contacts_per_pair, 1, 64),
+      HAPI_RULE(def, magnet_reach, 0.0, 0.1),
       HAPI_RULE(def, island_threads, 1, 64),
   };
   if (def->world == NULL || def->space == NULL) {
@@ -43,7 +45,7 @@ static hap_status ode_check(const hap_ode_def *def, hap_detail *detail)
   if (dCheckConfiguration("ODE_double_precision") == 0) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED, "the ODE library loaded is single precision");
   }
-  return hapi_numbers_check(rules, 2, detail);
+  return hapi_numbers_check(rules, sizeof rules / sizeof rules[0], detail);
 }
 
 static void world_report(void *user, hap_fault fault, const char *text)
@@ -96,6 +98,23 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
   return status;
 }
 
+static hap_status create_contact(hap_session *session, const hapi_capacity *capacity,
+                                 hap_detail *detail)
+{
+  const hapi_contact_caller *caller = hapi_physics_caller(session->physics);
+  const hapi_contact_config config = {
+      .capacity = *capacity,
+      .haptic_hz = session->def.haptic_hz,
+      .rt_priority = session->def.rt_priority,
+      .exchange = session->exchange,
+      .ask = caller->call != NULL ? hapi_contact_call : NULL,
+      .ask_of = caller,
+  };
+  return hapi_contact_create(&config, &session->contact) >= HAP_OK
+             ? HAP_OK
+             : hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the contact thread");
+}
+
 #define TRIANGLES 2048u  /* near all pointers that are spheres */
 #define TOOL_POINTS 256u /* of all pointers that are hulls: a few dozen touches */
 #define FEELS 128u       /* geoms with a surface of their own, near pointers */
@@ -106,7 +125,7 @@ static hap_status create_physics(hap_session *session, const hap_ode_def *ode,
 /* Slots for the range, as many again for what stands around it, and some for those that have left
  * and that the loop has not let go of. Geoms: a few a body. Joints: a chain has one a body, a truss
  * two. */
-static hapi_capacity capacity_of(const hap_session_def *def)
+static hapi_capacity capacity_of(const hap_session_def *def, const hap_ode_def *ode)
 {
   bool looks_back = def->expert->lookback > 0.0;
   hapi_capacity capacity = {
@@ -124,6 +143,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
       .crosses = 8 * (uint32_t)def->max_bodies,
       .triangles = TRIANGLES,
       .feels = FEELS,
+      .saids = ode->contact != NULL ? PAIRS_PER_CONTACT * (uint32_t)def->max_contacts : 0,
   };
   while (capacity.trail_rows > TRAIL_ROWS_LEAST &&
          capacity.trail_rows * capacity.bodies > TRAIL_PLACES) {
@@ -137,7 +157,7 @@ static hapi_capacity capacity_of(const hap_session_def *def)
 static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap_detail *detail)
 {
   const hap_session_def *def = &session->def;
-  hapi_capacity capacity = capacity_of(def);
+  hapi_capacity capacity = capacity_of(def, ode);
   session->textures = hapi_textures_create();
   hap_status status = session->textures != NULL
                           ? hapi_exchange_create(&capacity, &session->exchange)
@@ -154,20 +174,12 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
     };
     status = hapi_haptic_create(&config, &session->haptic);
   }
-  if (status >= HAP_OK) {
-    hapi_contact_config config = {
-        .capacity = capacity,
-        .haptic_hz = def->haptic_hz,
-        .rt_priority = def->rt_priority,
-        .exchange = session->exchange,
-    };
-    status = hapi_contact_create(&config, &session->contact);
-  }
   if (status < HAP_OK) {
     return hapi_fail(detail, status, "no memory for a session of %d bodies and %d contacts",
                      def->max_bodies, def->max_contacts);
   }
-  return create_physics(session, ode, &capacity, detail);
+  HAPI_TRY(create_physics(session, ode, &capacity, detail));
+  return create_contact(session, &capacity, detail);
 }
 
 static hap_status session_init(hap_session *session, const hap_session_def *def,
@@ -246,6 +258,44 @@ hap_status hap_session_forget_geom(hap_session *session, dGeomID geom)
   HAPI_TRY(may_edit(session, geom));
   hapi_physics_forget_geom(session->physics, geom);
   return HAP_OK;
+}
+
+hap_status hap_session_add_space(hap_session *session, dSpaceID space, uint32_t pairs)
+{
+  const uint32_t known = HAP_SPACE_INSIDE | HAP_SPACE_OTHERS;
+  HAPI_TRY(may_edit(session, space));
+  if (!dGeomIsSpace((dGeomID)space) || pairs == 0 || (pairs & ~known) != 0) {
+    return hapi_session_fail(
+        session, HAP_ERROR_ARGUMENT,
+        "it is no space, or pairs is %u: HAP_SPACE_INSIDE, HAP_SPACE_OTHERS or "
+        "both",
+        (unsigned)pairs);
+  }
+  hap_status status = hapi_physics_add_space(session->physics, space, pairs);
+  switch (status) {
+    case HAP_ERROR_STATE:
+      return hapi_session_fail(session, status,
+                               "the space already has a session: this one, or another one");
+    case HAP_ERROR_ARGUMENT:
+      return hapi_session_fail(session, status,
+                               "the space is inside another one, or the first space is inside it: "
+                               "add the outermost space alone");
+    case HAP_ERROR_CAPACITY:
+      return hapi_session_fail(session, status, "%d spaces were added already", HAP_SPACES_MAX);
+    default:
+      return hapi_session_say(session, status, __func__);
+  }
+}
+
+hap_status hap_session_remove_space(hap_session *session, dSpaceID space)
+{
+  HAPI_TRY(may_edit(session, space));
+  hap_status status = hapi_physics_remove_space(session->physics, space);
+  return status == HAP_ERROR_NOT_FOUND
+             ? hapi_session_fail(session, status,
+                                 "the space was not added, it was destroyed, or it is the first "
+                                 "one of the session, which stays")
+             : hapi_session_say(session, status, __func__);
 }
 
 hap_status hap_session_surface_changed(hap_session *session, dGeomID geom)

@@ -37,3 +37,17 @@ hap_status hap_pointer_set_outputs(hap_session *session, hap_pointer_id pointer,
   }
   return hapi_session_note(session, status, &detail);
 }
+
+hap_status hap_pointer_get_outputs(hap_session *session, hap_pointer_id pointer,
+                                   hap_pointer_outputs *out)
+{
+  hap_detail detail = {""};
+  hap_pointer_outputs known;
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  hap_pointer_outputs_init(&known, sizeof known);
+  HAPI_TRY(hapi_session_say_why_not(session, pointer,
+                                    hapi_haptic_get_outputs(session->haptic, pointer, &known)));
+  return hapi_session_note(session, hapi_def_write(&outputs_type, &known, out, &detail), &detail);
+}

@@ -155,7 +155,8 @@ static hap_status run_cycle(hap_player *player, const hapi_cell *cells, uint32_t
   return check_after(player, HAPI_STREAM_PHYSICS, detail);
 }
 
-static hap_status run_pass(hap_player *player, const hapi_cell *cell, hap_detail *detail)
+static hap_status run_pass(hap_player *player, const hapi_cell *cell, uint32_t count,
+                           hap_detail *detail)
 {
   hapi_tape *tape = &player->tapes[HAPI_STREAM_CONTACT];
   hapi_exchange *exchange = player->session->exchange;
@@ -166,7 +167,7 @@ static hap_status run_pass(hap_player *player, const hapi_cell *cell, hap_detail
   }
   hapi_exchange_expect(exchange, HAPI_CHANNEL_POSES, cell->u[HAPI_PASS_POSES]);
   hapi_exchange_expect(exchange, HAPI_CHANNEL_NEAR, cell->u[HAPI_PASS_NEAR]);
-  hapi_tape_load(tape, cell, 1);
+  hapi_tape_load(tape, cell, count);
   hapi_contact_pass(player->session->contact, cell->i[HAPI_PASS_VALID]);
   hapi_reader_pop(player->reader, HAPI_STREAM_CONTACT);
   if (count_published(player, HAPI_CHANNEL_PATCHES) == before) {
@@ -197,7 +198,7 @@ static hap_status run_passes_for(hap_player *player, uint64_t number, hap_detail
     HAPI_TRY(run_cycles_for(player, HAPI_CHANNEL_NEAR, cell->u[HAPI_PASS_NEAR], detail));
     /* that may have read on, and the cells have moved */
     HAPI_TRY(hapi_reader_peek(player->reader, HAPI_STREAM_CONTACT, &cell, &count, detail));
-    HAPI_TRY(run_pass(player, cell, detail));
+    HAPI_TRY(run_pass(player, cell, count, detail));
   }
   return HAP_OK;
 }
@@ -219,7 +220,7 @@ static hap_status run_ready_cycles(hap_player *player, hap_detail *detail)
     uint64_t there = count_published(player, HAPI_CHANNEL_STATE);
     HAPI_TRY(hapi_reader_glance(player->reader, HAPI_STREAM_PHYSICS, &cells, &count, detail));
     uint64_t wanted = cells != NULL ? cells->u[HAPI_CYCLE_STATE] : 0;
-    if (count < 2 ||
+    if (count == 0 ||
         wanted > there) { /* none in sight, not over in sight, or it waits for a tick */
       channel_await(player, HAPI_CHANNEL_STATE, wanted, wanted > there ? wanted : there + 1);
       return HAP_OK;
@@ -238,12 +239,12 @@ static hap_status run_ready_passes(hap_player *player, hap_detail *detail)
     HAPI_TRY(hapi_reader_glance(player->reader, HAPI_STREAM_CONTACT, &cell, &count, detail));
     uint64_t poses = cell != NULL ? cell->u[HAPI_PASS_POSES] : poses_there + 1;
     uint64_t near = cell != NULL ? cell->u[HAPI_PASS_NEAR] : near_there + 1;
-    if (poses > poses_there || near > near_there) {
+    if (count == 0 || poses > poses_there || near > near_there) {
       channel_await(player, HAPI_CHANNEL_POSES, poses, poses);
       channel_await(player, HAPI_CHANNEL_NEAR, near, near);
       return HAP_OK;
     }
-    HAPI_TRY(run_pass(player, cell, detail));
+    HAPI_TRY(run_pass(player, cell, count, detail));
   }
 }
 

@@ -15,6 +15,7 @@
 
 #define BYTES_MIN 65536u
 #define CELLS_OF_OTHERS 8192u /* rings of physics and contact thread: some seconds */
+#define CELLS_OF_VERDICTS 65536u
 #define CELLS_MIN 4096.0
 
 static const hap_record_def record_defaults = {
@@ -144,8 +145,9 @@ hap_status hap_session_record(hap_session *session, const hap_record_def *def, h
   double tick = 1.0 + 4.0 * session->def.max_pointers + HAPI_CELL_BODIES;
   double cells = d.buffer_s * session->def.haptic_hz * tick;
   config.cells[HAPI_STREAM_HAPTIC] = (uint32_t)(cells > CELLS_MIN ? cells : CELLS_MIN);
-  config.cells[HAPI_STREAM_PHYSICS] = CELLS_OF_OTHERS;
-  config.cells[HAPI_STREAM_CONTACT] = CELLS_OF_OTHERS;
+  uint32_t others = hapi_physics_asks(session->physics) ? CELLS_OF_VERDICTS : CELLS_OF_OTHERS;
+  config.cells[HAPI_STREAM_PHYSICS] = others;
+  config.cells[HAPI_STREAM_CONTACT] = others;
   hapi_session_move_defs(&config.info, &session->def, &session->expert, &session->research, true);
   hapi_file_describe(&config.info);
   snprintf(config.info.build.ode, sizeof config.info.build.ode, "%s",

@@ -90,15 +90,21 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
 /* A few sweeps more, two at least. */
 void hapi_solver_sweep_on(hapi_solver *solver);
 
-/* N s, the largest impulse of a friction under a normal's; of a ball the radius. */
-static inline double hapi_friction_most(const hapi_row *friction, double normal)
+/* N s, the largest impulse of a friction under a load; of a ball the radius. */
+static inline double hapi_friction_most(const hapi_row *friction, double load)
 {
-  return normal > 0.0 ? friction->mu * normal : 0.0; /* mu may be infinite: no 0 x infinity */
+  return load > 0.0 ? friction->mu * load : 0.0; /* mu may be infinite: no 0 x infinity */
+}
+
+/* N s, that friction goes by: a normal that sticks holds its friction, too. */
+static inline double hapi_row_load(const hapi_row *normal)
+{
+  return normal->impulse - normal->lo;
 }
 
 static inline double hapi_ball_radius(const hapi_row *rows, const hapi_row *first)
 {
-  return hapi_friction_most(first, rows[first->normal].impulse);
+  return hapi_friction_most(first, hapi_row_load(&rows[first->normal]));
 }
 
 /* The nearest impulses of the ball to what the errors of its rows ask for, and whether that is out
@@ -135,7 +141,7 @@ static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, do
   *out_lo = row->lo;
   *out_hi = row->hi;
   if (row->normal >= 0) {
-    *out_hi = hapi_friction_most(row, rows[row->normal].impulse);
+    *out_hi = hapi_friction_most(row, hapi_row_load(&rows[row->normal]));
     if (row->round > 0) {
       *out_hi = hapi_row_left(row, *out_hi);
     }

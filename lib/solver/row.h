@@ -16,7 +16,7 @@ typedef struct hapi_row {
   double softness; /* (m/s)/(N s), >= 0 */
   double inverse;  /* out: 1 / (ja.ba + jb.bb + softness); 0: singular or invalid, row left out */
   double response; /* inner: 1 / inverse */
-  double mu;       /* normal >= 0: bounds are -mu p .. mu p, p of that row; may be HUGE_VAL */
+  double mu; /* normal >= 0: bounds are -mu (p - lo) .. mu (p - lo), of that row; may be HUGE_VAL */
   double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact; of one of a
                          ball that slides: [0] its part of the force's direction */
   double lo;          /* N s; may be -HUGE_VAL */

@@ -76,6 +76,7 @@ static const message_array arrays[] = {
     NEAR(bodies_offset, body_count, hapi_near_body, bodies),
     NEAR(geoms_offset, geom_count, hapi_near_geom, geoms),
     NEAR(pairs_offset, pair_count, hapi_near_pair, pairs),
+    NEAR(saids_offset, said_count, hapi_near_said, saids),
     NEAR(points_offset, point_count, double[3], hull_points),
     NEAR(tools_offset, tool_count, hapi_near_tool, pointers),
     NEAR(tool_pairs_offset, tool_pair_count, hapi_near_tool_pair, contacts),

@@ -16,7 +16,9 @@ enum {
   HAPI_FEEL_SPRING = 1, /* stiffness and damping */
   HAPI_FEEL_STATIC = 2, /* what sticks holds more than what slides */
   HAPI_FEEL_TEXTURE = 4,
-  HAPI_FEEL_IMPACT = 8
+  HAPI_FEEL_IMPACT = 8,
+  HAPI_FEEL_ADHESION = 16,
+  HAPI_FEEL_MAGNET = 32
 };
 
 /* pointer/transient.h */
@@ -35,6 +37,9 @@ typedef struct hapi_feel {
   double damping;              /* N s/m; SPRING */
   const hapi_texture *texture; /* NULL: smooth */
   hapi_impact impact;          /* IMPACT */
+  double adhesion;             /* N; ADHESION */
+  double magnet_force;         /* N; MAGNET */
+  double magnet_reach;         /* m; MAGNET */
   hap_pose geom;               /* of its frame in that of its body; TEXTURE */
 } hapi_feel;
 

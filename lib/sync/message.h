@@ -37,6 +37,7 @@ typedef struct hapi_capacity {
   uint32_t springs;      /* of hapi_state; 0: they are not told */
   uint32_t triangles;    /* near pointers that are spheres */
   uint32_t feels;        /* pairs of a pointer and a geom with a surface of its own */
+  uint32_t saids;        /* pairs, where the application is asked about contacts; else 0 */
 } hapi_capacity;
 
 #define HAPI_TOOL_POINTS_MAX 64u /* vertices of a pointer's hull */

@@ -8,6 +8,7 @@
 #include "proximity/patch.h"
 #include "sync/message.h"
 #include "sync/patches.h"
+#include "sync/said.h"
 
 typedef struct hapi_near_geom {
   uint32_t body; /* slot; HAPI_SLOT_NONE: part of the static world */
@@ -55,6 +56,7 @@ typedef struct hapi_near_tool_pair {
   hapi_tag tag;
   double mu;     /* of its points */
   uint32_t feel; /* likewise */
+  double reach;  /* m, in which points are looked for, however slow */
 } hapi_near_tool_pair;
 
 typedef struct hapi_near {
@@ -74,11 +76,15 @@ typedef struct hapi_near {
   uint32_t points_offset;
   uint32_t tools_offset;
   uint32_t tool_pairs_offset;
+  uint32_t said_count; /* of the pairs, in their order; 0: nobody is asked about contacts */
+  uint32_t saids_offset;
+  hapi_surface_terms terms;
 } hapi_near;
 
 HAPI_MESSAGE_ARRAY(hapi_near_bodies, hapi_near, hapi_near_body, bodies_offset)
 HAPI_MESSAGE_ARRAY(hapi_near_geoms, hapi_near, hapi_near_geom, geoms_offset)
 HAPI_MESSAGE_ARRAY(hapi_near_pairs, hapi_near, hapi_near_pair, pairs_offset)
+HAPI_MESSAGE_ARRAY(hapi_near_saids, hapi_near, hapi_near_said, saids_offset)
 HAPI_MESSAGE_ARRAY(hapi_near_points, hapi_near, double, points_offset)
 HAPI_MESSAGE_ARRAY(hapi_near_tools, hapi_near, hapi_near_tool, tools_offset)
 HAPI_MESSAGE_ARRAY(hapi_near_tool_pairs, hapi_near, hapi_near_tool_pair, tool_pairs_offset)

@@ -456,6 +456,10 @@ static void rows_make(hapi_tick *tick)
   if (tick->pointers.grabs) {
     hapi_grab_rows(&tick->pointers, &tick->bodies, rows, tick->facts.period);
   }
+  if (tick->touches.magnets) {
+    const hapi_own_pushing at = hapi_tick_pushing(tick);
+    hapi_magnets_pull(&at);
+  }
   uint32_t of_pointers = rows->solver.row_count;
   /* What moves wakes what it touches and what hangs on it, as in ODE; before any of their rows. */
   if (tick->bodies.resting > 0) {
@@ -529,6 +533,10 @@ void hapi_contact_step(hapi_tick *tick)
   if (pointers->pushes) {
     const hapi_own_pushing at = hapi_tick_pushing(tick);
     hapi_own_push_account(&at);
+  }
+  if (tick->touches.magnets) {
+    const hapi_own_pushing at = hapi_tick_pushing(tick);
+    hapi_magnets_account(&at);
   }
   if (tick->joints.told > 0) {
     hapi_joints_tell(&tick->joints, &tick->bodies, &tick->rows, period);

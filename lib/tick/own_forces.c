@@ -113,12 +113,20 @@ static const hapi_local_body *bond_follow(hapi_own_force *own, const hapi_bodies
   return body;
 }
 
-/* The body answers to a force in the next tick. A spring or damper is stable as long as that does
- * not turn the way about: k dt^2 + 2 d dt within the mass that the force meets. What a light body
- * cannot hold is cut, for both. */
+/* Two things bound a spring or damper to a body. What a light body cannot hold is cut, for hand and
+ * body.
+ *
+ * The body answers to a force in the next tick: that is stable as long as the answer does not turn
+ * the way about, k dt^2 + 2 d dt within the mass that the force meets.
+ *
+ * The device answers late. A spring k that comes late by a gives k a w v to a hand of the velocity
+ * v, where w is how fast the hand leaves the body; what the device holds is the k at which its
+ * damping takes that for w = v. Free bodies swing against each other with w = v (1 + M / m): the
+ * device of mass M holds so much less. A damper likewise. */
 static double bond_share(const hapi_own_force *own, const hapi_local_body *body,
                          const hapi_pointer *p, const hap_wrench *wrench, double period)
 {
+  const hapi_pointer_holds *holds = &p->coupling.own;
   double push[6];
   double answer[6];
   double force = hapi_v3_norm(wrench->force);
@@ -128,10 +136,13 @@ static double bond_share(const hapi_own_force *own, const hapi_local_body *body,
   bond_push(body, p, wrench, push);
   hapi_row_response(body, push, answer);
   double gives = hapi_dot6(push, answer) / (force * force); /* 1/kg */
-  double hard =
-      (hapi_own_force_stiffness(&own->setup) * period + 2.0 * hapi_own_force_damping(&own->setup)) *
-      period * gives;
-  return hard > HAPI_SAFETY_OWN_ANSWER ? HAPI_SAFETY_OWN_ANSWER / hard : 1.0;
+  double stiffness = hapi_own_force_stiffness(&own->setup);
+  double damping = hapi_own_force_damping(&own->setup);
+  double late = hapi_max(stiffness / holds->stiffness, damping / holds->damping) *
+                (1.0 + holds->mass * gives);
+  double hard = (stiffness * period + 2.0 * damping) * period * gives;
+  double share = hard > HAPI_SAFETY_OWN_ANSWER ? HAPI_SAFETY_OWN_ANSWER / hard : 1.0;
+  return late > 1.0 ? hapi_min(share, 1.0 / late) : share;
 }
 
 /* ---- one of them ---- */

@@ -4,9 +4,12 @@
 
 #include <string.h>
 
+#include "base/safety.h"
 #include "base/six.h"
 #include "base/vec.h"
+#include "guard/promise.h"
 #include "local/body_step.h"
+#include "local/rows.h"
 
 /* N, N m on a body, of one force. */
 typedef struct own_push {
@@ -112,4 +115,112 @@ void hapi_own_push_world(const hapi_own_pushing *at)
       }
     }
   }
+}
+
+/* ---- surfaces that pull from a distance ---- */
+
+/* Of a body that can be pushed; false: none is. */
+static bool magnet_find(const hapi_own_pushing *at, const hapi_pair_magnet *magnet, own_push *out)
+{
+  out->body = hapi_bodies_at(at->bodies, magnet->body);
+  out->push = magnet->push;
+  return magnet->any && out->body != NULL && hapi_dot6(out->push, out->push) > 0.0 &&
+         (out->body->flags & HAPI_BODY_DRIVEN) == 0;
+}
+
+/* What the hand gets less, a light body could not hold: as of own forces. */
+static double magnet_holds(const hapi_own_pushing *at, const hapi_pair_magnet *magnet,
+                           const hapi_local_body *body)
+{
+  double answer[6];
+  double force2 = hapi_v3_dot(magnet->push, magnet->push);
+  if (at->facts->model != HAP_MODEL_CONTACT || force2 == 0.0 || !hapi_body_responds(body)) {
+    return 1.0;
+  }
+  hapi_row_response(body, magnet->push, answer);
+  double period = at->facts->period;
+  double hard = magnet->hardest * period * period * hapi_dot6(magnet->push, answer) / force2;
+  return hard > HAPI_SAFETY_OWN_ANSWER ? HAPI_SAFETY_OWN_ANSWER / hard : 1.0;
+}
+
+/* The opposite of what the hand gets, about the body's centre. */
+static void magnet_push(hapi_pair_magnet *magnet, const hapi_pointer *p,
+                        const hapi_local_body *body)
+{
+  double arm[3];
+  double moment[3];
+  hapi_v3_sub(p->pose.position, body->pose.position, arm);
+  hapi_v3_cross(arm, magnet->pull.force, moment);
+  hapi_v3_add(moment, magnet->pull.torque, moment);
+  hapi_v3_scale(-1.0, magnet->pull.force, magnet->push);
+  hapi_v3_scale(-1.0, moment, magnet->push + 3);
+}
+
+/* Within what it promises: its strength, at 1 m/s. */
+static void magnet_declare(const hapi_own_pushing *at, hapi_pair_feel *pair, hapi_pointer *p)
+{
+  hapi_pair_magnet *magnet = &pair->magnet;
+  double most = hapi_max(pair->in.feel.magnet_force, magnet->strength);
+  const hapi_promise promise = {
+      .force = most, .torque = most * p->shape.extent, .power = HAPI_SAFETY_OWN_SPEED * most};
+  if (magnet->begins) {
+    hapi_purse_fill(&magnet->purse, &promise);
+    magnet->begins = false;
+  }
+  p->declared.held |=
+      hapi_promise_keep(&promise, &magnet->purse, &p->declared, at->facts->period, &magnet->pull);
+  hapi_declare_following(&p->declared, &magnet->pull, magnet->hardest);
+}
+
+/* Bodies of other models than these have no motion of their own in the loop. */
+static bool magnet_acts(const hapi_own_pushing *at, const hapi_pair_magnet *magnet)
+{
+  return magnet->body == HAPI_SLOT_NONE || at->facts->model == HAP_MODEL_CONTACT ||
+         at->facts->model == HAP_MODEL_SINGLE;
+}
+
+void hapi_magnets_pull(const hapi_own_pushing *at)
+{
+  own_push p;
+  for (uint32_t i = 0; i < at->touches->feel_count; ++i) {
+    hapi_pair_feel *pair = &at->touches->feels[i];
+    hapi_pair_magnet *magnet = &pair->magnet;
+    hapi_pointer *pointer = &at->pointers->of[pair->in.pointer];
+    magnet->any = magnet->any && magnet_acts(at, magnet);
+    if (!magnet->any) {
+      continue;
+    }
+    const hapi_local_body *body = hapi_bodies_at(at->bodies, magnet->body);
+    if (body != NULL) {
+      magnet_push(magnet, pointer, body);
+      double holds = magnet_holds(at, magnet, body);
+      hapi_v3_scale(holds, magnet->pull.force, magnet->pull.force);
+      hapi_v3_scale(holds, magnet->pull.torque, magnet->pull.torque);
+    }
+    magnet_declare(at, pair, pointer);
+    if (body != NULL) {
+      magnet_push(magnet, pointer, body);
+    }
+    if (magnet_find(at, magnet, &p)) {
+      push_audit(at, &p);
+      if (at->facts->model == HAP_MODEL_CONTACT) {
+        push_velocity(at, &p);
+      } else {
+        push_outside(at, &p);
+      }
+    }
+  }
+}
+
+void hapi_magnets_account(const hapi_own_pushing *at)
+{
+  own_push p;
+  for (uint32_t i = 0; i < at->touches->feel_count; ++i) {
+    hapi_pair_magnet *magnet = &at->touches->feels[i].magnet;
+    if (magnet_find(at, magnet, &p) && at->facts->model == HAP_MODEL_CONTACT) {
+      push_work(at, &p);
+    }
+    magnet->any = false;
+  }
+  at->touches->magnets = false;
 }

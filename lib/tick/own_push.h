@@ -27,4 +27,10 @@ void hapi_own_push_account(const hapi_own_pushing *at);
 /* Model SINGLE: into the account of the world. */
 void hapi_own_push_world(const hapi_own_pushing *at);
 
+/* What surfaces pull hands with from a distance: declares it, and pushes the bodies back. After the
+ * contacts were placed, in model CONTACT before the solve. */
+void hapi_magnets_pull(const hapi_own_pushing *at);
+/* As hapi_own_push_account. */
+void hapi_magnets_account(const hapi_own_pushing *at);
+
 #endif

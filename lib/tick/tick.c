@@ -86,7 +86,7 @@ void hapi_tick_reset(hapi_tick *tick)
       .of = tick->bodies.of, .courses = tick->bodies.courses, .live = tick->bodies.live};
   touches->count = touches->pushing = 0;
   touches->feel_count = touches->unsound = 0;
-  touches->rubs = false;
+  touches->rubs = touches->magnets = false;
   touches->contact_ticks = 0;
   memset(touches->hand_impulse, 0, sizeof touches->hand_impulse);
   touches->hand_impulse_abs = 0.0;
@@ -156,6 +156,11 @@ static __attribute__((noinline)) void paper_step(hapi_tick *tick)
   if (tick->pointers.pushes) {
     const hapi_own_pushing at = hapi_tick_pushing(tick);
     hapi_own_push_world(&at);
+  }
+  if (tick->touches.magnets) {
+    const hapi_own_pushing at = hapi_tick_pushing(tick);
+    hapi_magnets_pull(&at);
+    hapi_magnets_account(&at);
   }
   if (tick->bodies.unsound) {
     hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);

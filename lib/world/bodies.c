@@ -139,8 +139,9 @@ void hapi_bodies_own(hapi_body_table *table, uint32_t index, bool loop_owned, bo
   table->entries[index].loop_touched = loop_touched;
 }
 
-/* Where another body has come to be at the address of a destroyed one, the entry begins anew. */
-static void follow_life(hapi_body_table *table, uint32_t index)
+/* Where another body has come to be at the address of a destroyed one, the entry begins anew: a
+ * carrier may be there, too. carriers NULL: it is a body of the application. */
+static void follow_life(hapi_body_table *table, const hapi_carriers *carriers, uint32_t index)
 {
   HAPI_ASSERT_INDEX(index, table->high);
   hapi_known_body *known = &table->entries[index];
@@ -148,6 +149,7 @@ static void follow_life(hapi_body_table *table, uint32_t index)
     dBodyID body = known->body;
     drop_entry(table, index);
     begin_entry(table, known, body);
+    known->rest->geom = carriers != NULL ? hapi_carried_geom(carriers, body) : NULL;
     table->listener->body_begun(table->listener->physics, index);
     ++table->replaced;
   }
@@ -178,7 +180,7 @@ static uint32_t find_living(hapi_body_table *table, dBodyID body)
 {
   uint32_t index = hapi_bodies_find(table, body);
   if (index != HAPI_NONE) {
-    follow_life(table, index);
+    follow_life(table, NULL, index);
   }
   return index;
 }
@@ -254,7 +256,7 @@ static bool see_body(hapi_world *world, const hapi_cycle *cycle, dBodyID body)
   hapi_body_table *table = &world->bodies;
   uint32_t index = find_next(table, body);
   if (index != HAPI_NONE && table->entries[index].seen != table->scan) {
-    follow_life(table, index);
+    follow_life(table, &world->carriers, index);
   }
   if (index == HAPI_NONE) {
     table->starved = table->starved || entry_add(table, body, &index) < HAP_OK;
@@ -329,6 +331,18 @@ static void see_space(hapi_world *world, const hapi_cycle *cycle, dSpaceID space
     } else {
       see_geom(world, cycle, geom);
     }
+  }
+}
+
+static void see_spaces(hapi_world *world, const hapi_cycle *cycle)
+{
+  if (hapi_spaces_look(&world->spaces) > 0) {
+    hapi_say_once(cycle, &world->said_space,
+                  "a space was destroyed without hap_session_remove_space; it was dropped. This is "
+                  "said once");
+  }
+  for (uint32_t i = 0; i < world->spaces.count; ++i) {
+    see_space(world, cycle, world->spaces.list[i].space);
   }
 }
 
@@ -421,7 +435,7 @@ hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle, bool syn
   table->fastest = 0.0;
   table->unsound = (hapi_unsound){NULL, NULL, NULL};
   hapi_carriers_begin_scan(&world->carriers, syncs);
-  see_space(world, cycle, world->ode.space);
+  see_spaces(world, cycle);
   hapi_carriers_end_scan(&world->carriers, table->scan);
   see_jointed(world, cycle);
   drop_unseen(world, cycle);

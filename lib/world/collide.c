@@ -10,11 +10,11 @@
 /* The collision phase: contact joints for the next step. */
 
 /* ODE wants it at right angles to the normal. A pair whose normal it is has ODE's own direction. */
-static void set_direction(dContact *contact, const double direction[3])
+static void settle_direction(dContact *contact)
 {
   double across[3];
   const double *n = contact->geom.normal;
-  hapi_v3_madd(direction, -hapi_v3_dot(direction, n), n, across);
+  hapi_v3_madd(contact->fdir1, -hapi_v3_dot(contact->fdir1, n), n, across);
   double length = hapi_v3_norm(across);
   if (length > 1e-6) {
     hapi_v3_scale(1.0 / length, across, contact->fdir1);
@@ -56,6 +56,34 @@ const dContact *hapi_world_contact_of(const hapi_world *world, dJointID joint)
   return ours ? &notes->list[number - 1].contact : NULL;
 }
 
+/* m/s, of a geom at a point. */
+static void geom_velocity(const hapi_world *world, dGeomID geom, const double point[3],
+                          double out[3])
+{
+  dVector3 velocity = {0.0, 0.0, 0.0, 0.0};
+  dBodyID own = dGeomGetBody(geom);
+  dBodyID body = own != NULL ? own : hapi_carrier_of(&world->carriers, geom);
+  if (body != NULL) {
+    dBodyGetPointVel(body, point[0], point[1], point[2], velocity);
+  }
+  hapi_v3_copy(velocity, out);
+}
+
+/* As the application wants it: false, none. */
+static bool contact_is_wanted(const hapi_world *world, const hapi_cycle *cycle, dContact *io)
+{
+  double velocity[3];
+  double other[3];
+  geom_velocity(world, io->geom.g1, io->geom.pos, velocity);
+  geom_velocity(world, io->geom.g2, io->geom.pos, other);
+  hapi_v3_sub(velocity, other, velocity);
+  if (!hapi_world_ask_contact(world->asking, io, velocity)) {
+    return false;
+  }
+  surface_soften(world, cycle, &io->surface);
+  return true;
+}
+
 uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cycle,
                                   const hapi_touching *touching, dSurfaceParameters *surface,
                                   bool notes)
@@ -69,7 +97,10 @@ uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cyc
   HAPI_ASSERT(touching->bodies[0] != touching->bodies[1]);
   int count = dCollide(a, b, world->ode.max_contacts_per_pair, &contacts[0].geom, sizeof(dContact));
   HAPI_ASSERT(count <= world->ode.max_contacts_per_pair);
-  surface_soften(world, cycle, surface);
+  bool asks = hapi_world_asks(world->asking);
+  if (!asks) { /* else each contact has its own */
+    surface_soften(world, cycle, surface);
+  }
   bool directed = count > 0 && (surface->mode & dContactFDir1) != 0 &&
                   hapi_world_direction(world, a, b, direction);
   if (!directed) {
@@ -82,7 +113,13 @@ uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cyc
     }
     contacts[i].surface = *surface;
     if (directed) {
-      set_direction(&contacts[i], direction);
+      hapi_v3_copy(direction, contacts[i].fdir1);
+    }
+    if (asks && !contact_is_wanted(world, cycle, &contacts[i])) {
+      continue;
+    }
+    if ((contacts[i].surface.mode & dContactFDir1) != 0) {
+      settle_direction(&contacts[i]);
     }
     dJointID joint = dJointCreateContact(world->ode.world, world->contact_group, &contacts[i]);
     dJointAttach(joint, touching->bodies[0], touching->bodies[1]);
@@ -150,6 +187,22 @@ static void collide_inside(collision *c, dSpaceID space)
   }
 }
 
+static void collide_spaces(collision *c, const hapi_spaces *spaces)
+{
+  for (uint32_t i = 0; i < spaces->count; ++i) {
+    const hapi_space *a = &spaces->list[i];
+    if ((a->pairs & HAP_SPACE_INSIDE) != 0) {
+      collide_inside(c, a->space);
+    }
+    for (uint32_t k = 0; k < i; ++k) {
+      const hapi_space *b = &spaces->list[k];
+      if ((a->pairs & b->pairs & HAP_SPACE_OTHERS) != 0) {
+        dSpaceCollide2((dGeomID)b->space, (dGeomID)a->space, c, near_callback);
+      }
+    }
+  }
+}
+
 void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes)
 {
   collision c = {world, cycle, notes, 0};
@@ -157,6 +210,6 @@ void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes)
   hapi_world_forget_surfaces(world);
   world->notes->count = 0;
   world->notes->softened = false;
-  collide_inside(&c, world->ode.space);
+  collide_spaces(&c, &world->spaces);
   world->counts.contacts_rejected += c.rejected;
 }

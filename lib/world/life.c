@@ -2,47 +2,10 @@
  * SPDX-License-Identifier: MIT */
 #include "world/world.h"
 
-#include <pthread.h>
 #include <stddef.h>
 
 #include "base/alloc.h"
 #include "base/assert.h"
-
-/* ---- who steps a world ---- */
-
-static pthread_mutex_t claims_lock = PTHREAD_MUTEX_INITIALIZER;
-static hapi_claim *claims;
-
-bool hapi_claim_take(hapi_claim *claim, dWorldID world)
-{
-  pthread_mutex_lock(&claims_lock);
-  const hapi_claim *other = claims;
-  while (other != NULL && other->world != world) {
-    other = other->next;
-  }
-  if (other == NULL) {
-    claim->world = world;
-    claim->next = claims;
-    claims = claim;
-  }
-  pthread_mutex_unlock(&claims_lock);
-  return other == NULL;
-}
-
-void hapi_claim_release(hapi_claim *claim)
-{
-  if (claim->world == NULL) {
-    return;
-  }
-  pthread_mutex_lock(&claims_lock);
-  hapi_claim **link = &claims;
-  while (*link != claim) {
-    link = &(*link)->next;
-  }
-  *link = claim->next;
-  claim->world = NULL;
-  pthread_mutex_unlock(&claims_lock);
-}
 
 /* ---- island threads ---- */
 
@@ -128,8 +91,9 @@ bool hapi_world_create(hapi_world *world, const hap_ode_def *def, uint32_t joint
   world->contact_scratch = hapi_alloc_array((size_t)def->max_contacts_per_pair, sizeof(dContact));
   world->surfaces = hapi_alloc(sizeof *world->surfaces);
   world->notes = hapi_alloc(sizeof *world->notes);
+  world->asking = hapi_alloc(sizeof *world->asking);
   if (world->contact_scratch == NULL || world->surfaces == NULL || world->notes == NULL ||
-      !hapi_joints_create(&world->joints, joint_slots) ||
+      world->asking == NULL || !hapi_joints_create(&world->joints, joint_slots) ||
       hapi_bodies_init(&world->bodies, listener) < HAP_OK) {
     return false;
   }
@@ -142,6 +106,7 @@ void hapi_world_finish(hapi_world *world)
   if (world->contact_group != NULL) {
     dJointGroupDestroy(world->contact_group);
   }
+  hapi_spaces_finish(&world->spaces);
   hapi_bodies_finish(&world->bodies);
   hapi_carriers_finish(&world->carriers);
   hapi_joints_finish(&world->joints);
@@ -152,6 +117,10 @@ void hapi_world_finish(hapi_world *world)
   if (world->notes != NULL) {
     hapi_free(world->notes->list);
   }
+  if (world->asking != NULL) {
+    hapi_verdicts_finish(&world->asking->verdicts);
+  }
+  hapi_free(world->asking);
   hapi_free(world->surfaces);
   hapi_free(world->notes);
   hapi_free(world->contact_scratch);

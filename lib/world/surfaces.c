@@ -29,7 +29,7 @@ static bool part_is_sound(const dSurfaceParameters *s, int bit, double value, do
 
 /* What ODE reads of a surface must be numbers: one that is not ends in an abort of the process, and
  * so can a softness below 0, which divides by what is left of a row. */
-static bool surface_is_sound(const dSurfaceParameters *s)
+bool hapi_surface_is_sound(const dSurfaceParameters *s)
 {
   const double most = SURFACE_MOST;
   return s->mu >= 0.0 && /* ODE reads it whatever the mode is */
@@ -68,7 +68,7 @@ static bool ask_application(const hapi_world *world, const hapi_cycle *cycle, dG
   if (world->ode.surface != NULL && !world->ode.surface(world->ode.user, a, b, out)) {
     return false;
   }
-  if (!surface_is_sound(out)) {
+  if (!hapi_surface_is_sound(out)) {
     cycle->config->report(cycle->config->user, HAP_FAULT_WORLD,
                           "the surface callback gave a number that is not finite, or a friction, "
                           "softness or slip below 0: the pair has no contact");
@@ -158,12 +158,42 @@ bool hapi_world_ask_surface(const hapi_world *world, const hapi_cycle *cycle, dG
   return entry->collides;
 }
 
-static void fill_surface(dWorldID world, const hapi_cycle *cycle, const dSurfaceParameters *s,
-                         hapi_surface *out)
+void hapi_said_surface_of(const dSurfaceParameters *s, const double direction[3],
+                          hapi_said_surface *out)
+{
+  *out = (hapi_said_surface){.mode = s->mode,
+                             .mu = s->mu,
+                             .mu2 = s->mu2,
+                             .rho = {s->rho, s->rho2, s->rhoN},
+                             .bounce = s->bounce,
+                             .bounce_speed = s->bounce_vel,
+                             .soft_erp = s->soft_erp,
+                             .soft_cfm = s->soft_cfm,
+                             .motion = {s->motion1, s->motion2, s->motionN},
+                             .slip = {s->slip1, s->slip2}};
+  hapi_v3_copy(direction, out->direction);
+}
+
+void hapi_surface_terms_of(const hapi_world *world, const hapi_cycle *cycle,
+                           hapi_surface_terms *out)
+{
+  dWorldID ode = world->ode.world;
+  *out = (hapi_surface_terms){
+      .erp = dWorldGetERP(ode),
+      .cfm = dWorldGetCFM(ode),
+      .ratio = hapi_tick_ratio(cycle),
+      .scale = hapi_cycle_scale(cycle), /* the loop's velocities are those of the hand's time */
+      .layer = dWorldGetContactSurfaceLayer(ode),
+      .max_push = dWorldGetContactMaxCorrectingVel(ode),
+      .rigid = hapi_wish_is_off(cycle->wishes, HAP_EFFECT_RESTITUTION)};
+}
+
+void hapi_surface_make(const hapi_surface_terms *terms, const dSurfaceParameters *s,
+                       hapi_surface *out)
 {
   memset(out, 0, sizeof *out);
-  out->erp = (s->mode & dContactSoftERP) != 0 ? s->soft_erp : dWorldGetERP(world);
-  out->cfm = (s->mode & dContactSoftCFM) != 0 ? s->soft_cfm : dWorldGetCFM(world);
+  out->erp = (s->mode & dContactSoftERP) != 0 ? s->soft_erp : terms->erp;
+  out->cfm = (s->mode & dContactSoftCFM) != 0 ? s->soft_cfm : terms->cfm;
   const struct {
     int mode;
     uint32_t flag;
@@ -177,16 +207,16 @@ static void fill_surface(dWorldID world, const hapi_cycle *cycle, const dSurface
   for (size_t i = 0; i < sizeof bits / sizeof bits[0]; ++i) {
     flags |= (s->mode & bits[i].mode) != 0 ? bits[i].flag : 0u;
   }
-  out->flags = flags;
-  double scale = hapi_cycle_scale(cycle); /* the loop's velocities are those of the hand's time */
-  hapi_soften(hapi_tick_ratio(cycle), &out->erp, &out->cfm);
+  double scale = terms->scale;
+  out->flags = terms->rigid != 0 ? flags & ~(uint32_t)HAPI_SURFACE_BOUNCE : flags;
+  hapi_soften(terms->ratio, &out->erp, &out->cfm);
   out->cfm *= scale;
   out->mu = s->mu;
   out->mu2 = (s->mode & dContactMu2) != 0 ? s->mu2 : s->mu;
   out->bounce = s->bounce;
   out->bounce_speed = scale * s->bounce_vel;
-  out->layer = dWorldGetContactSurfaceLayer(world);
-  out->max_push = scale * dWorldGetContactMaxCorrectingVel(world);
+  out->layer = terms->layer;
+  out->max_push = scale * terms->max_push;
   out->motion[0] = (s->mode & dContactMotion1) != 0 ? scale * s->motion1 : 0.0;
   out->motion[1] = (s->mode & dContactMotion2) != 0 ? scale * s->motion2 : 0.0;
   out->motion[2] = (s->mode & dContactMotionN) != 0 ? scale * s->motionN : 0.0;
@@ -203,15 +233,18 @@ bool hapi_world_surface(const hapi_world *world, const hapi_cycle *cycle, hapi_l
   }
   dGeomID a = link->turned ? link->other : link->own;
   dGeomID b = link->turned ? link->own : link->other;
-  fill_surface(world->ode.world, cycle, &surface, out);
+  hapi_surface_terms terms;
+  hapi_surface_terms_of(world, cycle, &terms);
+  hapi_surface_make(&terms, &surface, out);
   double direction[3];
   if ((surface.mode & dContactFDir1) != 0 && hapi_world_direction(world, a, b, direction)) {
     hapi_v3_copy(direction, out->direction);
   } else {
     out->flags &= ~(uint32_t)HAPI_SURFACE_FDIR1;
+    surface.mode &= ~dContactFDir1;
   }
-  if (hapi_wish_is_off(cycle->wishes, HAP_EFFECT_RESTITUTION)) {
-    out->flags &= ~(uint32_t)HAPI_SURFACE_BOUNCE;
+  if (world->asking->caller.call != NULL) {
+    hapi_said_surface_of(&surface, out->direction, &link->said);
   }
   return true;
 }

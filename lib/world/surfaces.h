@@ -47,6 +47,8 @@ typedef struct hapi_link {
   dReal box[6];   /* own's, with the reach */
   hapi_surface surface;
   bool turned; /* the surface is of (other, own) */
+  hapi_said_surface
+      said; /* the same for the world's step, where the application is asked about contacts */
 } hapi_link;
 
 /* The application's answer for the pair, asked for once a step in model CONTACT; false: no contact.
@@ -58,5 +60,16 @@ bool hapi_world_surface(const hapi_world *world, const hapi_cycle *cycle, hapi_l
 /* First friction direction of a pair whose surface has dContactFDir1; false: none was given. */
 bool hapi_world_direction(const hapi_world *world, dGeomID a, dGeomID b, double out[3]);
 void hapi_world_forget_surfaces(hapi_world *world); /* a new step */
+
+/* False: what ODE would end the process on, or make NaN of. */
+bool hapi_surface_is_sound(const dSurfaceParameters *surface);
+/* direction: unit, or 0. */
+void hapi_said_surface_of(const dSurfaceParameters *surface, const double direction[3],
+                          hapi_said_surface *out);
+void hapi_surface_terms_of(const hapi_world *world, const hapi_cycle *cycle,
+                           hapi_surface_terms *out);
+/* [any] *out is zeroed before; without its direction. */
+void hapi_surface_make(const hapi_surface_terms *terms, const dSurfaceParameters *surface,
+                       hapi_surface *out);
 
 #endif

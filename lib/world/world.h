@@ -12,8 +12,11 @@
 
 #include "world/bodies.h"
 #include "world/carriers.h"
+#include "world/claim.h"
+#include "world/contact_call.h"
 #include "world/cycle.h"
 #include "world/joints.h"
+#include "world/spaces.h"
 #include "world/surfaces.h"
 
 /* Standard gravity, for the smallest perturbation of a testing simulation. */
@@ -37,14 +40,6 @@ typedef struct hapi_world_counts {
   uint64_t contacts_rejected;
 } hapi_world_counts;
 
-/* One session at most steps a world. Two of them give the world each other's contact joints and
- * undo each other's steps, until ODE aborts the process. The list of claimed worlds is shared by
- * all threads and has a lock of its own. */
-typedef struct hapi_claim {
-  dWorldID world; /* NULL: nothing is claimed */
-  struct hapi_claim *next;
-} hapi_claim;
-
 /* Threads for the islands of the global step, between begin and end of a session. */
 typedef struct hapi_islands {
   dThreadingImplementationID threading; /* NULL: the thread that calls steps all of them */
@@ -59,11 +54,14 @@ struct hapi_world {
   bool begun;      /* a session has taken the world over, and the bodies' sleep with it */
   bool gone;       /* the application has destroyed the world, and nothing of it may be touched */
   dGeomID witness; /* on a disabled body of ours, while begun; NULL: there is none */
+  hapi_spaces spaces;
+  bool said_space; /* that one was destroyed */
   hapi_body_table bodies;
   hapi_carriers carriers;
   hapi_joint_table joints;
   hapi_surface_cache *surfaces;
   hapi_contact_notes *notes;
+  hapi_world_asking *asking;
   dJointGroupID contact_group;
   dContact *contact_scratch;
   hapi_islands islands;
@@ -94,12 +92,6 @@ dBodyID hapi_geom_body(const hapi_world *world, dGeomID geom);
 void hapi_flight_prepare(const hapi_world *world, double step_s);
 
 /* life.c */
-/* False: another claim has the world, and *claim is unchanged. *claim stays where it is until
- * release. */
-bool hapi_claim_take(hapi_claim *claim, dWorldID world);
-/* A zeroed claim is allowed. */
-void hapi_claim_release(hapi_claim *claim);
-
 /* repeats: every run must come to the same, so that one thread steps all. False: no threads to
  * be had. */
 bool hapi_islands_begin(hapi_world *world, bool repeats);

@@ -23,7 +23,7 @@
 
 #define LOCK_TRIES 50 /* of 10 ms */
 #define FORCE_TRIES 200
-#define WRITER_LOOKS 20000 /* some 20 us */
+#define WRITER_LOOK_NS 20000
 #define WRITER_PAUSES 16
 #define WRITER_PAUSE_NS 100000
 
@@ -319,7 +319,8 @@ static bool writer_await(hapi_spidar_serial *serial)
   if (!alone && atomic_load(&serial->writer) == (uintptr_t)pthread_self()) {
     return false;
   }
-  for (int i = 0; i < WRITER_LOOKS && !alone; ++i) {
+  int64_t end = hapi_clock_now() + WRITER_LOOK_NS;
+  while (!alone && hapi_clock_now() < end) {
     alone =
         atomic_load_explicit(&serial->writer, memory_order_relaxed) == 0 && writer_enter(serial);
   }

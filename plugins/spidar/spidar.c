@@ -21,7 +21,6 @@
 #define ANSWER_S 0.25                /* for an exchange of start */
 #define PERIOD_S 1e-3                /* between two writes, at least */
 #define BYTE_S 5e-6                  /* 10 bits of 2 Mbit/s */
-#define LATE_LEAST_S 0.002           /* of a read: less is a loop's own jitter */
 #define WRITE_LATE_S 0.01            /* a longer pause between two writes counts as this */
 #define LITTLE 0.01                  /* of the greatest force */
 #define WRAP 65536.0
@@ -163,7 +162,7 @@ static double late_by(const hapi_spidar_device *device, int64_t time_ns)
   double gap =
       device->reads.newest_ns >= 0 ? 1e-9 * (double)(time_ns - device->reads.newest_ns) : 0.0;
   double late = gap - device->reads.gap;
-  return late > LATE_LEAST_S && gap < HAPI_SAFETY_GAP_MOST_S ? late : 0.0;
+  return late > HAPI_SAFETY_READ_LATE_S && gap < HAPI_SAFETY_GAP_MOST_S ? late : 0.0;
 }
 
 /* What has come, into pose and twist. */

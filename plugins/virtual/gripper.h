@@ -14,6 +14,8 @@ typedef struct hapi_gripper {
   bool yields; /* else exactly on the script */
   double high; /* m, opening from 0 on */
   double max_force;
+  double rated_stiffness; /* that it says of itself, 0: nothing */
+  double rated_damping;
   hapi_motion motion; /* its first number */
   hapi_hand fingers;
   double held; /* N, of the newest write; positive: it opens */

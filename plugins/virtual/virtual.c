@@ -94,6 +94,8 @@ enum argument {
   GRIPPER_HZ,
   GRIPPER_MOST,
   GRIPPER_FORCE,
+  GRIPPER_STIFFNESS,
+  GRIPPER_DAMPING,
   LEDS,
   VIBRATORS,
   ARGUMENT_COUNT
@@ -194,6 +196,10 @@ static const hapi_argument known_arguments[ARGUMENT_COUNT] = {
                       .number = {0.08}},
     [GRIPPER_FORCE] = {"gripper_force", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e3, "N from 0 to 1000",
                        .number = {10.0}},
+    [GRIPPER_STIFFNESS] = {"gripper_stiffness", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e9,
+                           "N/m from 0 to 1e9"},
+    [GRIPPER_DAMPING] = {"gripper_damping", HAPI_ARGUMENT_NUMBER, false, 0.0, 1e6,
+                         "N s/m from 0 to 1e6"},
     [LEDS] = {"leds", HAPI_ARGUMENT_NUMBER, false, 0.0, 32.0, "a whole number from 0 to 32"},
     [VIBRATORS] = {"vibrators", HAPI_ARGUMENT_NUMBER, false, 0.0, HAP_VIBRATORS_MAX,
                    "a whole number from 0 to 4"},
@@ -340,7 +346,7 @@ static hap_status set_gripper(virtual_device *device, const hapi_argument *entri
   hapi_gripper *gripper = &device->gripper;
   size_t word = entries[HAND].given || !is_tuned(entries) ? entries[HAND].word : RELAXED;
   gripper->there = entries[GRIPPER].given || entries[GRIPPER_SINE].given;
-  for (int i = GRIPPER_HZ; !gripper->there && i <= GRIPPER_FORCE; ++i) {
+  for (int i = GRIPPER_HZ; !gripper->there && i <= GRIPPER_DAMPING; ++i) {
     if (entries[i].given) {
       return hapi_fail(detail, HAP_ERROR_ARGUMENT,
                        "virtual: %s needs gripper= or gripper_sine=", entries[i].key);
@@ -349,6 +355,8 @@ static hap_status set_gripper(virtual_device *device, const hapi_argument *entri
   gripper->yields = word != RIGID;
   gripper->high = entries[GRIPPER_MOST].number[0];
   gripper->max_force = entries[GRIPPER_FORCE].number[0];
+  gripper->rated_stiffness = entries[GRIPPER_STIFFNESS].number[0];
+  gripper->rated_damping = entries[GRIPPER_DAMPING].number[0];
   hapi_hand_init(&gripper->fingers, &fingers[word]);
   hapi_motion *motion = &gripper->motion;
   motion->blend = device->motion.blend;
@@ -750,6 +758,8 @@ static void virtual_describe_axis(void *self, uint32_t effector, uint32_t axis, 
   out->low = 0.0;
   out->high = device->gripper.high;
   out->max_force = device->gripper.max_force;
+  out->rated_stiffness = device->gripper.rated_stiffness;
+  out->rated_damping = device->gripper.rated_damping;
 }
 
 void hapi_virtual_get_port(const void *self, hapi_virtual_port *out)
@@ -777,7 +787,8 @@ const hap_device_ops hapi_virtual_ops = {
         "max_force=, max_torque=, rated_stiffness=, device_mass=, device_damping=, friction=, "
         "delay=, quantum=, dof=3|6; dof=6: turn=T:rx/ry/rz;..., turn_sine=, turn_hz=, inertia=, "
         "turn_damping=, turn_stiffness=, device_inertia=, device_turn_damping=; "
-        "gripper=T:x;..., gripper_sine=A, gripper_hz=F, gripper_max=, gripper_force=; leds=, "
+        "gripper=T:x;..., gripper_sine=A, gripper_hz=F, gripper_max=, gripper_force=, "
+        "gripper_stiffness=, gripper_damping=; leds=, "
         "vibrators=",
     .pacing = HAP_PACING_VIRTUAL,
     .open = virtual_open,

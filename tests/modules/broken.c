@@ -140,6 +140,7 @@ static void broken_describe(void *self, uint32_t effector, hap_device_info *out)
   (void)effector;
   const broken *d = self;
   out->dof = 6;
+  out->effector_count = fault_is(d, "two_effectors") ? 2 : 1;
   out->max_force = fault_is(d, "info_changes") && d->started ? 2.0 * FORCE_MAX : FORCE_MAX;
   out->max_torque = TORQUE_MAX;
   out->measures_velocity = fault_is(d, "measures_twice") ? 2 : 1;
@@ -270,10 +271,24 @@ static hap_status broken_read(void *self, int64_t time_ns, hap_device_input *con
   if (!fault_is(d, "buttons_are_not_filled_in")) {
     in->buttons = 0;
   }
+  const double turns = 3.0 * 6.283185307179586; /* 1/s */
+  double angle = turns * 1e-9 * (double)(time_ns - d->first_ns);
   in->axes[0] = fault_is(d, "axis_is_nan")      ? (double)NAN
                 : fault_is(d, "axis_is_beyond") ? 0.06
-                                                : 0.02;
-  in->axis_rates[0] = 0.0;
+                                                : 0.02 + 0.01 * sin(angle);
+  in->axis_rates[0] = 0.01 * turns * cos(angle) *
+                      (fault_is(d, "axis_rate_is_double")    ? 2.0
+                       : fault_is(d, "axis_rate_is_against") ? -1.0
+                       : fault_is(d, "axis_rate_is_none")    ? 0.0
+                                                             : 1.0);
+  if (fault_is(d, "two_effectors")) { /* the second one as the first, 10 mm beside it */
+    out[1]->pose = in->pose;
+    out[1]->pose.position[1] += 0.01;
+    out[1]->twist = in->twist;
+    out[1]->buttons = 0;
+    out[1]->axes[0] = in->axes[0];
+    out[1]->axis_rates[0] = in->axis_rates[0];
+  }
   return status;
 }
 
@@ -372,6 +387,10 @@ static hap_status broken_write(void *self, const hap_device_output *const wanted
   d->pushed = d->pushed || vector_norm(given.force) > 0.0;
   if (!fault_is(d, "reached_is_not_filled_in")) {
     reached[0]->wrench = given;
+  }
+  if (fault_is(d, "two_effectors")) {
+    reached[1]->wrench = wanted[1]->wrench;
+    reached[1]->axis_forces[0] = wanted[1]->axis_forces[0];
   }
   if (fault_is(d, "reached_is_a_lie")) {
     for (int i = 0; i < 3; ++i) {

@@ -30,6 +30,7 @@ static const struct {
     {"reached_is_plausible", conform_reached},
     {"held_is_what_was_reached", conform_held_is_reached},
     {"twist_fits_the_poses", conform_twist_fits},
+    {"axis_rates_fit_the_axes", conform_axis_rates_fit},
     {"zero_takes_the_force_off", conform_zero_takes_force},
     {"axis_forces_are_reached", conform_axis_forces},
     {"leds_and_vibrators_are_taken", conform_lights},

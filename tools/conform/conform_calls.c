@@ -158,6 +158,8 @@ hap_status conform_read(conform *c, conform_sample *out)
   }
   out->pose = c->device->effectors[0].input.pose;
   out->twist = c->device->effectors[0].input.twist;
+  memcpy(out->axes, c->device->effectors[0].input.axes, sizeof out->axes);
+  memcpy(out->axis_rates, c->device->effectors[0].input.axis_rates, sizeof out->axis_rates);
   if (c->ops->pacing == HAP_PACING_DEVICE) {
     c->now_ns = end_ns; /* the read has waited */
   }

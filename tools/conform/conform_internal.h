@@ -25,6 +25,8 @@ typedef struct conform_sample {
   double time; /* s */
   hap_pose pose;
   hap_twist twist;
+  double axes[HAP_AXES_MAX];
+  double axis_rates[HAP_AXES_MAX];
 } conform_sample;
 
 /* Ticks at rest and ticks under the small force, one after the other. */
@@ -173,6 +175,7 @@ void conform_axis_values(conform *c);
 void conform_read_time(conform *c);
 void conform_steps(conform *c);
 void conform_twist_fits(conform *c);
+void conform_axis_rates_fit(conform *c);
 void conform_after_pause(conform *c);
 
 void conform_workspace(conform *c);

@@ -13,6 +13,7 @@
 #define WINDOW 20u
 #define GRAIN 1e-6      /* m, of a window */
 #define GRAIN_TURN 1e-4 /* rad */
+#define GRAIN_AXIS 1e-3 /* of an axis's range: what its encoder may resolve */
 #define TURN_ARM 0.02   /* m, on which a device may measure turning by its quantum */
 #define PAUSE_S 0.4
 
@@ -206,6 +207,59 @@ void conform_twist_fits(conform *c)
   }
   if (!c->failed && !moved && !turned) {
     conform_skip(c, "it did not move: nothing to compare");
+  }
+}
+
+/* Of an axis: the sum of the mean rates over a window against the way. */
+static mismatch axis_compare(const conform *c, uint32_t axis)
+{
+  mismatch m = {0.0, 0.0, 0.0, 0};
+  for (unsigned begin = 0; begin + WINDOW < c->seen.record_count; begin += WINDOW) {
+    const conform_sample *s = &c->seen.record[begin];
+    double sum = 0.0;
+    for (unsigned i = 1; i <= WINDOW; ++i) {
+      double rate = s[i].axis_rates[axis];
+      sum += 0.5 * (rate + s[i - 1].axis_rates[axis]) * (s[i].time - s[i - 1].time);
+      m.speed = fmax(m.speed, fabs(rate));
+    }
+    double way = s[WINDOW].axes[axis] - s[0].axes[axis];
+    m.path += fabs(way);
+    m.off += fabs(way - sum);
+    ++m.windows;
+  }
+  return m;
+}
+
+void conform_axis_rates_fit(conform *c)
+{
+  const hapi_effector *effector = &c->device->effectors[0];
+  bool moved = false;
+  if (effector->info.axis_count == 0) {
+    conform_skip(c, "it has no axes");
+    return;
+  }
+  if (!conform_needs_reads(c)) {
+    return;
+  }
+  if (c->seen.wrong.axes > 0) {
+    conform_skip(c, "axes are not finite, or beyond their ranges");
+    return;
+  }
+  for (uint32_t i = 0; i < effector->info.axis_count && !c->failed; ++i) {
+    const hap_axis_info *axis = &effector->axes[i];
+    double grain = GRAIN_AXIS * (axis->high - axis->low);
+    mismatch m = axis_compare(c, i);
+    moved = moved || m.speed > 0.0 || m.path > 0.0;
+    conform_note(c, "axis %u: path %.3g, rates off by %.2g", i, m.path, m.off);
+    if (m.off > PATH_SHARE * m.path + grain * m.windows) {
+      conform_fail(c,
+                   "axis %u: over windows of %u ticks the rates add up to something else than the "
+                   "way, off by %.3g of %.3g: axis_rates is the axis's change a second",
+                   i, WINDOW, m.off, m.path);
+    }
+  }
+  if (!c->failed && !moved) {
+    conform_skip(c, "no axis moved: nothing to compare");
   }
 }
 

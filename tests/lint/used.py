@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: hapode contributors
+# SPDX-License-Identifier: MIT
+"""used.py ROOT: every function of the public headers is in a test, in a program that shows it, and
+on a page. What is not has a reason here; a reason that is not needed any more is a fault."""
+import re
+import sys
+
+import lint
+
+FUNCTION = re.compile(r"\bHAP_API\b[^;{]*?\b(\w+)\s*\([^;{]*\)\s*;")
+SHOWN = ("examples/", "plugins/skeleton/", "tools/")  # programs, whose source a user may copy
+SAME_EVERYWHERE = re.compile(r"_(init|name|text)$")  # pages name the struct or enum
+
+# Function: why no page has it.
+NO_PAGE = {
+    "hap_version": "the header says all",
+}
+
+
+def because(reason, names):
+    return {name: reason for name in names.split()}
+
+
+# Function: why no program shows it.
+NO_PROGRAM = {
+    **because("the page of its subject has the lines", """
+        hap_session_set_budget hap_session_set_force_error hap_session_surface_changed
+        hap_session_try_lock"""),
+    **because("one call, as its neighbour in the header, which a program shows", """
+        hap_pointer_force_remove hap_session_remove_space"""),
+    **because("a name for people, or defaults of a struct", """
+        hap_event_name hap_force_kind_name hap_grab_def_init hap_scene_def_init
+        hap_scene_name_at"""),
+}
+
+
+def names_in(root, files):
+    found = set()
+    for name in files:
+        found |= set(re.findall(r"\w+", lint.read(root, name)))
+    return found
+
+
+def main(root):
+    tap = lint.Tap()
+    files = lint.code_files(root)
+    functions = {f for name in files if name.startswith("include/") and name.endswith(".h")
+                 for f in FUNCTION.findall(lint.without_comments(lint.read(root, name)))}
+    tests = names_in(root, [f for f in files if f.startswith("tests/")])
+    programs = names_in(root, [f for f in files if f.startswith(SHOWN)])
+    pages = names_in(root, [f for f in lint.project_files(root) if f.endswith(".md") and
+                            (f == "README.md" or f.startswith("docs/"))])
+    tap.point("there are functions", [] if functions else ["none found"])
+    tap.point("every function is in a test", sorted(functions - tests))
+    tap.point("every function is in a program", sorted(functions - programs - NO_PROGRAM.keys()))
+    asked = {f for f in functions if not SAME_EVERYWHERE.search(f)}
+    tap.point("every function is on a page", sorted(asked - pages - NO_PAGE.keys()))
+    tap.point("every exception is needed",
+              sorted((NO_PAGE.keys() & pages) | (NO_PROGRAM.keys() & programs) |
+                     ((NO_PAGE.keys() | NO_PROGRAM.keys()) - functions)))
+    tap.done()
+
+
+main(sys.argv[1])

@@ -1,0 +1,249 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Surfaces that pull the hand from a distance: by the public headers, against closed forms. */
+
+#include "tests/tap.h"
+
+#include <hapode/hapode.h>
+#include <hapode/ode.h>
+
+#include "tests/surface_world.h"
+
+#define FORCE 2.0   /* N */
+#define REACH 0.015 /* m */
+#define PEAK (1.5 * sqrt(3.0))
+
+static contact_world *magnet_floor(hap_model model)
+{
+  contact_world *w = floor_new(model);
+  w->ode.magnet_reach = 0.02;
+  told.says.magnet_force = FORCE;
+  told.says.magnet_reach = REACH;
+  return w;
+}
+
+/* N at a gap, towards the surface. */
+static double magnet_of(double gap)
+{
+  double u = gap / REACH;
+  return u > 0.0 && u < 1.0 ? FORCE * PEAK * u * (1.0 - u * u) : 0.0;
+}
+
+typedef struct rate_row {
+  const char *name;
+  double rate;
+} rate_row;
+
+static const rate_row rates[] = {
+    {"it_pulls_at_1_khz", 1e3},
+    {"it_pulls_at_5_khz", 5e3},
+    {"it_pulls_at_10_khz", 1e4},
+};
+
+/* Down from beyond its reach into the surface, and up again: each tick, all models. */
+TEST_EACH(rates, const rate_row *row)
+{
+  for (size_t m = 0; m < MODELS; ++m) {
+    contact_world *w = magnet_floor(all_models[m]);
+    cw_add_floor(w);
+    w->def.haptic_hz = row->rate;
+    cw_start(w, 0.0, 0.0, RADIUS + 0.03);
+    double worst = 0.0;
+    double work = 0.0;
+    int second = (int)row->rate;
+    cw_run(w, second / 20);
+    for (int i = 0; i < 2 * second; ++i) {
+      double before = w->force[2];
+      cw_go(w, 0.0, 0.0, i < second ? -0.032 : 0.032, 1);
+      double gap = w->hand_at[2] - RADIUS;
+      double right = gap > 0.0 ? -magnet_of(gap) : -STIFFNESS * gap;
+      worst = fmax(worst, fabs(w->force[2] - right));
+      work += 0.5 * (before + w->force[2]) * w->hand_velocity[2] / row->rate;
+    }
+    printf("# model %zu: %.2g N, %.2g J\n", m, worst, work);
+    CHECK(worst < 1e-9 && fabs(work) < 1e-9 * row->rate);
+    CHECK(cw_stats(w).faults.fault == HAP_FAULT_NONE);
+  }
+}
+
+/* A round beside and over a ball: no energy. */
+TEST(no_round_about_a_ball_gives_energy)
+{
+  contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+  dGeomSetPosition(dCreateSphere(w->space, 0.03), 0.0, 0.0, -0.03);
+  w->def.haptic_hz = 1e4;
+  cw_start(w, 0.0, 0.0, RADIUS + 0.004);
+  cw_run(w, 1000);
+  double work = 0.0;
+  double most = 0.0;
+  const double ways[4][3] = {
+      {0.02, 0.0, 0.0}, {0.0, 0.0, 0.006}, {-0.02, 0.0, 0.0}, {0.0, 0.0, -0.006}};
+  for (int leg = 0; leg < 4; ++leg) {
+    cw_move_hand(w, ways[leg][0] / 0.2, ways[leg][1] / 0.2, ways[leg][2] / 0.2);
+    for (int i = 0; i < 2000; ++i) {
+      double before[3];
+      memcpy(before, w->force, sizeof before);
+      cw_tick(w);
+      for (int k = 0; k < 3; ++k) {
+        work += 0.5 * (before[k] + w->force[k]) * w->hand_velocity[k] * 1e-4;
+      }
+      most = fmax(most, cw_norm(w->force));
+    }
+  }
+  printf("# %.3g J of %.3g\n", work, FORCE * REACH);
+  CHECK(most > 0.5 * FORCE && fabs(work) < 1e-4 * FORCE * REACH);
+}
+
+/* A ball in free space is drawn to the hand by what the hand feels. */
+TEST(the_body_gets_what_the_hand_feels)
+{
+  for (int i = 0; i < 2; ++i) {
+    contact_world *w = magnet_floor(i == 0 ? HAP_MODEL_CONTACT : HAP_MODEL_SINGLE);
+    cw_add_ball(w, 0.2, 0.03, 0.0, 0.0, -0.03);
+    cw_start(w, 0.0, 0.0, RADIUS + 0.008);
+    cw_run(w, 30);
+    CHECK(w->force[2] < -0.3 * FORCE);
+    CHECK(w->seen.momentum[2] > 1e-3);
+    CHECK_NEAR(w->seen.impulse[2], w->seen.momentum[2], 2e-3 * w->seen.momentum[2]);
+  }
+}
+
+/* A block that has gone to sleep on the floor is drawn up, and its floor is there. */
+TEST(a_body_that_sleeps_wakes)
+{
+  static const double forces[] = {1.0, 4.0};
+  for (int i = 0; i < 2; ++i) {
+    contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+    told.other = cw_add_floor(w);
+    dWorldSetGravity(w->world, 0.0, 0.0, -CW_GRAVITY);
+    dWorldSetAutoDisableFlag(w->world, 1);
+    dBodyID block = cw_add_box(w, 0.2, AT(0.06, 0.06, 0.04), 0.0, 0.0, 0.02);
+    dBodySetAutoDisableFlag(block, 1);
+    told.says.magnet_force = forces[i];
+    cw_start(w, 0.0, 0.0, 0.04 + RADIUS + 0.1);
+    cw_run(w, 1500);
+    double at = w->position[0][2];
+    double lowest = at;
+    cw_move_hand(w, 0.0, 0.0, -0.93);
+    for (int k = 0; k < 400; ++k) {
+      if (k == 100) {
+        cw_move_hand(w, 0.0, 0.0, 0.0);
+      }
+      cw_tick(w);
+      lowest = fmin(lowest, w->position[0][2]);
+    }
+    CHECK(at - lowest < 1e-7);
+    CHECK((w->position[0][2] - at > 1e-3) == (i == 1)); /* 4 N lift 2 N */
+  }
+}
+
+/* 1 g of it cannot swing faster than the tick. */
+TEST(light_bodies_stay_bounded)
+{
+  static const double masses[] = {0.001, 0.01, 0.1, 1.0};
+  for (size_t i = 0; i < 4; ++i) {
+    contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+    w->research.guard = HAP_GUARD_ON;
+    told.says.magnet_force = 20.0;
+    told.says.magnet_reach = 0.003;
+    told.says.damping = 1.0;
+    cw_add_ball(w, masses[i], 0.03, 0.0, 0.0, -0.03);
+    cw_start(w, 0.0, 0.0, RADIUS + 0.002);
+    double fastest = 0.0;
+    for (int k = 0; k < 2000; ++k) {
+      cw_go(w, 0.0, 0.0, k % 200 < 100 ? 0.02 : -0.02, 1);
+      fastest = fmax(fastest, cw_norm(w->velocity[0]));
+    }
+    double depth = 20.0 * 0.003 * PEAK / 4.0; /* J, of the potential */
+    printf("# %g kg: %.3g m/s\n", masses[i], fastest);
+    CHECK(fastest < 0.1 + 2.0 * sqrt(2.0 * depth / masses[i]));
+    CHECK(cw_stats(w).faults.fault == HAP_FAULT_NONE);
+  }
+}
+
+TEST(a_magnet_that_comes_about_the_hand_does_not_leap)
+{
+  for (size_t m = 0; m < MODELS; ++m) {
+    contact_world *w = magnet_floor(all_models[m]);
+    cw_add_floor(w);
+    told.says.magnet_force = 0.0;
+    cw_start(w, 0.0, 0.0, RADIUS + 0.008);
+    cw_run(w, 50);
+    CHECK(cw_norm(w->force) == 0.0);
+    for (int round = 0; round < 2; ++round) {
+      told.says.magnet_force = round == 0 ? FORCE : 0.5 * FORCE;
+      surface_change(w, NULL);
+      double before = w->force[2];
+      for (int i = 0; i < 100; ++i) {
+        cw_tick(w);
+        CHECK(fabs(w->force[2] - before) <= FORCE / 20.0 + 1e-9);
+        before = w->force[2];
+      }
+      CHECK_NEAR(w->force[2], -magnet_of(0.008) * (round == 0 ? 1.0 : 0.5), 1e-9);
+    }
+  }
+}
+
+/* With the guard: no observer holds it back. */
+TEST(the_guard_lets_it_be)
+{
+  contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+  cw_add_floor(w);
+  w->research.guard = HAP_GUARD_ON;
+  w->hand_def.max_force = 5.0;
+  cw_start(w, 0.0, 0.0, RADIUS + 0.02);
+  cw_run(w, 50);
+  for (int i = 0; i < 4000; ++i) {
+    cw_go(w, 0.0, 0.0, i % 800 < 400 ? -0.05 : 0.05, 1);
+    double gap = w->hand_at[2] - RADIUS;
+    CHECK_NEAR(w->force[2], gap > 0.0 ? -magnet_of(gap) : -STIFFNESS * gap, 1e-6);
+  }
+  hap_stats stats = cw_stats(w);
+  CHECK(stats.faults.energy_ticks == 0 && stats.faults.fault == HAP_FAULT_NONE);
+}
+
+/* Towards one geom, and from the geom's own reach on. */
+TEST(what_is_wrong_is_refused)
+{
+  static const double reaches[] = {0.0009, 0.0201, (double)NAN, 0.02};
+  static const double forces[] = {1.0, 1.0, 1.0, 100.1};
+  for (int i = 0; i < 4; ++i) {
+    contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+    cw_add_floor(w);
+    cw_start(w, 0.0, 0.0, RADIUS + 0.004);
+    told.says.magnet_reach = reaches[i];
+    told.says.magnet_force = forces[i];
+    surface_change(w, NULL);
+    (void)hap_session_advance(w->session, 40);
+    CHECK(cw_stats(w).faults.fault == HAP_FAULT_WORLD);
+  }
+  contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+  hap_detail detail = {""};
+  w->ode.magnet_reach = 0.11;
+  w->ode.world = w->world;
+  w->ode.space = w->space;
+  CHECK(hap_session_create(&w->def, &w->ode, &w->session, &detail) == HAP_ERROR_ARGUMENT);
+  CHECK(strstr(detail.text, "magnet_reach") != NULL);
+}
+
+/* Its points share it. */
+TEST(a_hull_is_pulled)
+{
+  for (size_t m = 0; m < MODELS; ++m) {
+    double corners[8 * 3];
+    contact_world *w = magnet_floor(all_models[m]);
+    cw_add_floor(w);
+    hand_be_cube(w, corners);
+    cw_start(w, 0.0, 0.0, RADIUS + 0.03);
+    cw_run(w, 50);
+    double worst = 0.0;
+    for (int i = 0; i < 1000; ++i) {
+      cw_go(w, 0.0, 0.0, -0.032, 1);
+      double gap = w->hand_at[2] - RADIUS;
+      worst = fmax(worst, fabs(w->force[2] - (gap > 0.0 ? -magnet_of(gap) : -STIFFNESS * gap)));
+    }
+    printf("# model %zu: %.2g N\n", m, worst);
+    CHECK(worst < 1e-6);
+  }
+}
