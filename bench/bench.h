@@ -54,6 +54,7 @@ hap_status bench_jitter(bench *b);
 hap_status bench_late(bench *b);
 hap_status bench_line(bench *b);
 hap_status bench_oscillation(bench *b);
+hap_status bench_peers(bench *b);
 hap_status bench_poses(bench *b);
 hap_status bench_scaling(bench *b);
 hap_status bench_spidar(bench *b);

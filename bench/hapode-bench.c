@@ -56,6 +56,9 @@ static const program programs[] = {
     {"line", bench_line, "a SPIDAR at 1 kHz through its emulator: ticks without a new answer"},
     {"oscillation", bench_oscillation,
      "a device that swings by itself or runs away: when the guard acts, and where it must not"},
+    {"peers", bench_peers,
+     "the same worlds and hand in engines that are stepped at 1 kHz: time, force; --scene "
+     "WORLD[:N]"},
     {"poses", bench_poses,
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},
@@ -188,7 +191,8 @@ static bool options_fit(const program *p, const bench *b)
   bool known = b->estimates == NULL || strcmp(b->estimates, "all") == 0 ||
                strcmp(b->estimates, "default") == 0;
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
-      p->run != bench_effects && p->run != bench_faults && p->run != bench_late) {
+      p->run != bench_effects && p->run != bench_faults && p->run != bench_late &&
+      p->run != bench_peers) {
     wrong = "has no scenes to choose from";
   } else if (b->random_worlds > 0 && (p->run != bench_faults || b->scene != NULL)) {
     wrong = "has no random worlds: --random is for faults, without --scene";

@@ -1,0 +1,503 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* hapode-bench peers: the same worlds, hand and pointer in a session and in engines that are
+ * stepped at 1 kHz. Times are medians over runs that are interleaved engine by engine. */
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench/peers_run.h"
+
+#define PEERS_COLUMNS                                                           \
+  "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode" \
+  ",iterations,peak_n,rest_mm,asleep,repeats"
+
+#define REPEATS 5
+#define REPEATS_QUICK 3
+#define PEER_HZ 1000.0
+#define TRUTH_ITERATIONS 1000
+#define TRUTH_BOXES_MOST 100 /* larger worlds take a truth too long */
+#define APART_TRUTH_BOXES 10 /* nothing but the floor touches the one that the hand meets */
+#define SLEEP_SETTLE_S 0.8   /* until all sleep */
+#define FIRST_WITHIN 0.1     /* of ODE's force while friction holds the box */
+#define REST_MOST 5e-4       /* m, way of a box that nobody touches */
+#define CONTESTANTS_MOST 8
+#define SIZES_MOST 8
+#define ROWS_MOST 256
+#define ONE_PANEL "1,1"
+#define ALL_PANELS "2,4" /* rows, columns: one of each world */
+
+typedef struct world_plan {
+  const char *name;
+  int sizes[SIZES_MOST]; /* boxes; 0: end */
+  int quick_most;        /* with --quick no larger world */
+} world_plan;
+
+static const world_plan plans[] = {
+    {"apart", {10, 100, 1000, 3000}, 1000},
+    {"apart_sleep", {100, 1000, 3000}, 1000},
+    {"row", {10, 30, 64, 100}, 64},
+    {"pile", {10, 30, 64, 100, 300, 1000}, 64},
+    {"tower", {8}, 8},
+    {"chain", {10}, 10},
+    {"ragdoll", {10}, 10},
+    {"mesh", {1}, 1},
+};
+
+/* A session, or an engine. */
+typedef struct contestant {
+  const peer_engine *engine; /* NULL: a session */
+  double physics_hz;
+} contestant;
+
+typedef struct peers_row {
+  const contestant *who;
+  const char *world;
+  int bodies;
+  double us_per_ms; /* medians */
+  double p99_us;
+  double error;     /* NaN: not known */
+  double error_ode; /* likewise */
+  double first;     /* at the begin of the touch, of ODE's; NaN: not known */
+  size_t asleep;
+  int repeats;
+  peers_run run; /* the first one */
+} peers_row;
+
+typedef struct peers_bed {
+  bench *bench;
+  contestant who[CONTESTANTS_MOST];
+  size_t who_count;
+  peers_row rows[ROWS_MOST];
+  size_t row_count;
+} peers_bed;
+
+static const char *contestant_name(const contestant *who)
+{
+  return who->engine != NULL ? who->engine->name : "hapode";
+}
+
+static bool world_sleeps(const char *name)
+{
+  return strcmp(name, "apart_sleep") == 0;
+}
+
+static void contestants_find(peers_bed *bed)
+{
+  const peer_engine *engine;
+  bed->who[bed->who_count++].physics_hz = 60.0;
+  bed->who[bed->who_count++].physics_hz = 20.0;
+  for (size_t i = 0; (engine = peer_engine_at(i)) != NULL; ++i) {
+    bed->who[bed->who_count++] = (contestant){engine, PEER_HZ};
+  }
+}
+
+static bool contestant_takes(const contestant *who, const char *world, int bodies)
+{
+  return who->engine == NULL ||
+         (bodies <= who->engine->boxes_most && (who->engine->can_sleep || !world_sleeps(world)));
+}
+
+/* ---- a case ---- */
+
+static hap_status contestant_run(bench *b, const contestant *who, const peer_world *world,
+                                 bool may_sleep, peers_run *out)
+{
+  if (who->engine == NULL) {
+    return peers_run_session(b, world, who->physics_hz, may_sleep, out);
+  }
+  peer_setting setting = {1.0 / PEER_HZ, who->engine->iterations, may_sleep, false};
+  return peers_run_engine(b, who->engine, world, &setting, out);
+}
+
+/* Without one there is no force. */
+static hap_status truth_run(bench *b, const peer_engine *engine, const char *name, int bodies,
+                            peers_run *out)
+{
+  peer_world world;
+  bool apart = strncmp(name, "apart", 5) == 0;
+  peer_setting setting = {1.0 / PEER_HZ, TRUTH_ITERATIONS, false, true};
+  memset(out, 0, sizeof *out);
+  if (!apart && bodies > TRUTH_BOXES_MOST) {
+    return HAP_OK;
+  }
+  if (!peer_world_create(apart ? "apart" : name, apart ? APART_TRUTH_BOXES : bodies, &world)) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %s", name);
+  }
+  hap_status status = peers_run_engine(b, engine, &world, &setting, out);
+  peer_world_destroy(&world);
+  return status;
+}
+
+static hap_status row_judge(bench *b, const peer_world *world, const peers_run *ode_truth,
+                            peers_row *row)
+{
+  const peer_engine *engine = row->who->engine;
+  peers_run truth = {0};
+  hap_status status = HAP_OK;
+  row->first = (double)NAN;
+  if (ode_truth->force != NULL) {
+    row->first = peers_run_first(world, &row->run) / peers_run_first(world, ode_truth);
+  }
+  row->error = row->error_ode = peers_run_error(&row->run, ode_truth);
+  if (engine != NULL && engine != &peer_ode) {
+    status = truth_run(b, engine, row->world, row->bodies, &truth);
+    row->error = status >= HAP_OK ? peers_run_error(&row->run, &truth) : (double)NAN;
+    peers_run_free(&truth);
+  }
+  return status;
+}
+
+/* Of the medians of each tick over the repeats, which are alike: a disturbance of one of them does
+ * not show. */
+static double ticks_p99(const peers_run *runs, size_t repeats)
+{
+  double values[REPEATS];
+  double *ticks = calloc(runs[0].count, sizeof *ticks);
+  if (ticks == NULL) {
+    return (double)NAN;
+  }
+  for (size_t i = 0; i < runs[0].count; ++i) {
+    for (size_t n = 0; n < repeats; ++n) {
+      values[n] = runs[n].tick_us[i];
+    }
+    ticks[i] = bench_median(values, repeats);
+  }
+  (void)bench_median(ticks, runs[0].count); /* sorts */
+  double p99 = bench_quantile(ticks, runs[0].count, 0.99);
+  free(ticks);
+  return p99;
+}
+
+static void row_note_times(peers_row *row, peers_run *runs, size_t repeats)
+{
+  double us[REPEATS];
+  for (size_t n = 0; n < repeats; ++n) {
+    us[n] = runs[n].us_per_ms;
+  }
+  row->repeats = (int)repeats;
+  row->us_per_ms = bench_median(us, repeats);
+  row->p99_us = ticks_p99(runs, repeats);
+  row->run = runs[0];
+  memset(&runs[0], 0, sizeof runs[0]);
+}
+
+/* Engine after engine, and that again. rows: one of each. */
+static hap_status case_time(bench *b, const peer_world *world, peers_row *rows, size_t count)
+{
+  peers_run runs[CONTESTANTS_MOST][REPEATS] = {{{0}}};
+  size_t repeats = b->quick ? REPEATS_QUICK : REPEATS;
+  hap_status status = HAP_OK;
+  for (size_t n = 0; n < repeats; ++n) {
+    for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
+      status = contestant_run(b, rows[i].who, world, world_sleeps(rows[i].world), &runs[i][n]);
+    }
+  }
+  for (size_t i = 0; i < count; ++i) {
+    if (status >= HAP_OK) {
+      row_note_times(&rows[i], runs[i], repeats);
+    }
+    for (size_t n = 0; n < repeats; ++n) {
+      peers_run_free(&runs[i][n]);
+    }
+  }
+  return status;
+}
+
+static void number_write(FILE *csv, double value)
+{
+  if (isnan(value)) {
+    fputc(',', csv);
+  } else {
+    fprintf(csv, ",%.5g", value);
+  }
+}
+
+static void row_write(FILE *csv, const peers_row *r)
+{
+  int iterations = r->who->engine != NULL ? r->who->engine->iterations : peer_ode.iterations;
+  fprintf(csv, "%s,%s,%d,%g,%.5g,%.5g", contestant_name(r->who), r->world, r->bodies,
+          r->who->physics_hz, r->us_per_ms, r->p99_us);
+  number_write(csv, r->error);
+  number_write(csv, r->error_ode);
+  fprintf(csv, ",%d,%.5g,%.4g,%zu,%d\n", iterations, peers_run_peak(&r->run), 1e3 * r->run.rest,
+          r->run.asleep, r->repeats);
+}
+
+static void error_text(double error, char *out, size_t size)
+{
+  if (isnan(error)) {
+    snprintf(out, size, "-");
+  } else {
+    snprintf(out, size, "%.2f %%", 100.0 * error);
+  }
+}
+
+static void row_report(bench *b, const peers_row *r)
+{
+  char error[32];
+  char error_ode[32];
+  char name[64];
+  bool sleeps = world_sleeps(r->world);
+  size_t asleep = sleeps ? (size_t)r->bodies : 0;
+  error_text(r->error, error, sizeof error);
+  error_text(r->error_ode, error_ode, sizeof error_ode);
+  snprintf(name, sizeof name, "%s:%d, %s %g Hz", r->world, r->bodies, contestant_name(r->who),
+           r->who->physics_hz);
+  bench_say("%-30s %8.1f us a ms, p99 %8.1f us, force %s, of ODE's %s", name, r->us_per_ms,
+            r->p99_us, error, error_ode);
+  if (b->verify) {
+    bench_check(b, isnan(r->first) || fabs(r->first - 1.0) <= FIRST_WITHIN,
+                "%s: first force %.3f of ODE's (bound %g)", name, r->first, FIRST_WITHIN);
+    bench_check(b, r->run.rest <= REST_MOST, "%s: at rest a box goes %.3f mm (bound %.1f)", name,
+                1e3 * r->run.rest, 1e3 * REST_MOST);
+    bench_check(b, r->run.asleep == asleep, "%s: %zu boxes asleep (right: %zu)", name,
+                r->run.asleep, asleep);
+  }
+}
+
+static hap_status case_run(peers_bed *bed, FILE *csv, const char *name, int bodies)
+{
+  bench *b = bed->bench;
+  peer_world world;
+  peers_run ode_truth = {0};
+  peers_row *rows = &bed->rows[bed->row_count];
+  size_t count = 0;
+  if (!peer_world_create(name, bodies, &world)) {
+    return bench_fail(b, HAP_ERROR_ARGUMENT, "no world %s of %d boxes", name, bodies);
+  }
+  for (size_t i = 0; i < bed->who_count; ++i) {
+    if (contestant_takes(&bed->who[i], name, bodies)) {
+      rows[count++] = (peers_row){.who = &bed->who[i], .world = name, .bodies = bodies};
+    } else {
+      bench_say("%s:%d without %s, which %s", name, bodies, contestant_name(&bed->who[i]),
+                world_sleeps(name) ? "does not sleep" : "would take too long");
+    }
+  }
+  if (world_sleeps(name)) {
+    world.hand.settle_s = SLEEP_SETTLE_S;
+  }
+  bed->row_count += count;
+  hap_status status = case_time(b, &world, rows, count);
+  if (status >= HAP_OK) {
+    status = truth_run(b, &peer_ode, name, bodies, &ode_truth);
+  }
+  for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
+    status = row_judge(b, &world, &ode_truth, &rows[i]);
+    row_write(csv, &rows[i]);
+    row_report(b, &rows[i]);
+  }
+  peers_run_free(&ode_truth);
+  peer_world_destroy(&world);
+  return status;
+}
+
+/* Forces of all ticks, where there are few worlds. */
+static hap_status forces_write(const peers_bed *bed)
+{
+  FILE *csv =
+      bench_csv_open(bed->bench, "peers_trace", "engine,world,bodies,physics_hz,tick,fx,fy,fz");
+  for (size_t i = 0; csv != NULL && i < bed->row_count; ++i) {
+    const peers_row *r = &bed->rows[i];
+    for (size_t n = 0; n < r->run.count; ++n) {
+      const double *f = r->run.force[n];
+      fprintf(csv, "%s,%s,%d,%g,%zu,%.6g,%.6g,%.6g\n", contestant_name(r->who), r->world, r->bodies,
+              r->who->physics_hz, n, f[0], f[1], f[2]);
+    }
+  }
+  return bench_csv_close(bed->bench, csv, HAP_OK);
+}
+
+/* ---- pictures ---- */
+
+static bool row_is(const peers_row *r, const contestant *who, const char *world)
+{
+  return r->who == who && strcmp(r->world, world) == 0;
+}
+
+static void costs_data(FILE *script, const peers_bed *bed, size_t who, size_t plan)
+{
+  fprintf(script, "$c%zu_%zu << EOD\n", plan, who);
+  for (size_t i = 0; i < bed->row_count; ++i) {
+    const peers_row *r = &bed->rows[i];
+    if (row_is(r, &bed->who[who], plans[plan].name)) {
+      fprintf(script, "%d %g %g\n", r->bodies, r->us_per_ms, r->p99_us);
+    }
+  }
+  fprintf(script, "EOD\n");
+}
+
+/* Of a world the cases of one contestant. */
+static size_t costs_count(const peers_bed *bed, size_t who, size_t plan)
+{
+  size_t count = 0;
+  for (size_t i = 0; i < bed->row_count; ++i) {
+    count += row_is(&bed->rows[i], &bed->who[who], plans[plan].name);
+  }
+  return count;
+}
+
+static void costs_panel(FILE *script, const peers_bed *bed, size_t plan)
+{
+  bool any = false;
+  fprintf(script, "set title '%s' noenhanced\n", plans[plan].name);
+  for (size_t who = 0; who < bed->who_count; ++who) {
+    if (costs_count(bed, who, plan) > 0) {
+      fprintf(script, "%s $c%zu_%zu using 1:2 with linespoints lt %zu pt 7 ps 0.5 title '%s%s'",
+              any ? "," : "plot", plan, who, who + 1, contestant_name(&bed->who[who]),
+              bed->who[who].engine != NULL     ? ""
+              : bed->who[who].physics_hz > 20. ? " 60 Hz"
+                                               : " 20 Hz");
+      any = true;
+    }
+  }
+  fprintf(script, "\n");
+}
+
+static bool plan_was_run(const peers_bed *bed, size_t plan)
+{
+  return costs_count(bed, 0, plan) > 0;
+}
+
+static void costs_draw(FILE *script, const void *data)
+{
+  const peers_bed *bed = data;
+  for (size_t plan = 0; plan < BENCH_COUNT(plans); ++plan) {
+    for (size_t who = 0; who < bed->who_count; ++who) {
+      costs_data(script, bed, who, plan);
+    }
+  }
+  fprintf(script,
+          "set linetype 7 lc rgb '#000000' lw 1.5\nset logscale xy\nset format y '%%g'\n"
+          "set xlabel 'bodies'\nset ylabel 'us a simulated ms'\n"
+          "set key top left font ',9'\nset multiplot layout %s\n",
+          bed->bench->scene != NULL ? ONE_PANEL : ALL_PANELS);
+  for (size_t plan = 0; plan < BENCH_COUNT(plans); ++plan) {
+    if (plan_was_run(bed, plan)) {
+      costs_panel(script, bed, plan);
+    }
+  }
+  fprintf(script, "unset multiplot\n");
+}
+
+/* The smallest world of each kind: force along the hand's path. */
+static const peers_row *force_row(const peers_bed *bed, size_t who, size_t plan)
+{
+  for (size_t i = 0; i < bed->row_count; ++i) {
+    if (row_is(&bed->rows[i], &bed->who[who], plans[plan].name)) {
+      return &bed->rows[i];
+    }
+  }
+  return NULL;
+}
+
+static void forces_draw(FILE *script, const void *data)
+{
+  const peers_bed *bed = data;
+  for (size_t plan = 0; plan < BENCH_COUNT(plans); ++plan) {
+    for (size_t who = 0; who < bed->who_count; ++who) {
+      const peers_row *r = force_row(bed, who, plan);
+      fprintf(script, "$f%zu_%zu << EOD\n", plan, who);
+      for (size_t i = 0; r != NULL && i < r->run.count; ++i) {
+        fprintf(script, "%zu %g\n", i, -r->run.force[i][0]);
+      }
+      fprintf(script, "EOD\n");
+    }
+  }
+  fprintf(script,
+          "set linetype 7 lc rgb '#000000' lw 1.5\nset xlabel 'ms'\n"
+          "set ylabel 'force along -x [N]'\nset key bottom right font ',9'\n"
+          "set multiplot layout %s\n",
+          bed->bench->scene != NULL ? ONE_PANEL : ALL_PANELS);
+  for (size_t plan = 0; plan < BENCH_COUNT(plans); ++plan) {
+    const peers_row *first = force_row(bed, 0, plan);
+    bool any = false;
+    if (first == NULL) {
+      continue;
+    }
+    fprintf(script, "set title '%s:%d' noenhanced\n", first->world, first->bodies);
+    for (size_t who = 0; who < bed->who_count; ++who) {
+      if (force_row(bed, who, plan) != NULL) {
+        fprintf(script, "%s $f%zu_%zu using 1:2 with lines lt %zu title '%s %g Hz'",
+                any ? "," : "plot", plan, who, who + 1, contestant_name(&bed->who[who]),
+                bed->who[who].physics_hz);
+        any = true;
+      }
+    }
+    fprintf(script, "\n");
+  }
+  fprintf(script, "unset multiplot\n");
+}
+
+/* ---- the program ---- */
+
+static hap_status plan_run(peers_bed *bed, FILE *csv, const world_plan *plan)
+{
+  hap_status status = HAP_OK;
+  for (int i = 0; i < SIZES_MOST && plan->sizes[i] > 0 && status >= HAP_OK; ++i) {
+    if (!bed->bench->quick || plan->sizes[i] <= plan->quick_most) {
+      status = case_run(bed, csv, plan->name, plan->sizes[i]);
+    }
+  }
+  return status;
+}
+
+/* NAME or NAME:N, a world of the plans. */
+static hap_status scene_run(peers_bed *bed, FILE *csv, const char *scene)
+{
+  size_t length = strcspn(scene, ":");
+  for (size_t i = 0; i < BENCH_COUNT(plans); ++i) {
+    const char *name = plans[i].name;
+    if (strncmp(name, scene, length) == 0 && name[length] == '\0') {
+      return scene[length] == ':'
+                 ? case_run(bed, csv, name, (int)strtol(scene + length + 1, NULL, 10))
+                 : plan_run(bed, csv, &plans[i]);
+    }
+  }
+  return bench_fail(bed->bench, HAP_ERROR_ARGUMENT, "no world %s", scene);
+}
+
+static hap_status worlds_run(peers_bed *bed, FILE *csv)
+{
+  hap_status status = HAP_OK;
+  if (bed->bench->scene != NULL) {
+    return scene_run(bed, csv, bed->bench->scene);
+  }
+  for (size_t i = 0; i < BENCH_COUNT(plans) && status >= HAP_OK; ++i) {
+    status = plan_run(bed, csv, &plans[i]);
+  }
+  return status;
+}
+
+hap_status bench_peers(bench *b)
+{
+  const char *missing;
+  peers_bed *bed = calloc(1, sizeof *bed);
+  if (bed == NULL) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the table");
+  }
+  bed->bench = b;
+  contestants_find(bed);
+  for (size_t i = 0; (missing = peer_missing_at(i)) != NULL; ++i) {
+    bench_say("left out: %s", missing);
+  }
+  FILE *csv = bench_csv_open(b, "peers", PEERS_COLUMNS);
+  hap_status status = csv != NULL ? worlds_run(bed, csv) : HAP_ERROR_IO;
+  status = bench_csv_close(b, csv, status);
+  if (status >= HAP_OK && b->scene != NULL) {
+    status = forces_write(bed);
+  }
+  if (status >= HAP_OK) {
+    status = bench_draw(b, "peers", 1400, 700, costs_draw, bed);
+  }
+  if (status >= HAP_OK) {
+    status = bench_draw(b, "peers_force", 1400, 700, forces_draw, bed);
+  }
+  for (size_t i = 0; i < bed->row_count; ++i) {
+    peers_run_free(&bed->rows[i].run);
+  }
+  free(bed);
+  return status;
+}

@@ -1,0 +1,41 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_BENCH_PEERS_RUN_H
+#define HAPODE_BENCH_PEERS_RUN_H
+
+/* One run of hapode-bench peers: a world, the hand's whole path, an engine at 1 kHz or a session.
+ */
+
+#include "bench/bench.h"
+#include "bench/peer.h"
+
+#define PEERS_TICK_S 0.001
+
+typedef struct peers_run {
+  size_t count;       /* ticks, from the end of settling on */
+  double (*force)[3]; /* N, on the hand, in each of them */
+  double *tick_us;    /* us, wall clock: of each step of the engine or tick of the session */
+  double us_per_ms;   /* us of processor a simulated ms, all that was done in these ticks */
+  double rest;        /* m, farthest way of a box from its begin while all settled */
+  size_t asleep;      /* boxes, at the end of settling */
+} peers_run;
+
+hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_world *world,
+                            const peer_setting *setting, peers_run *out);
+
+/* Model CONTACT at all defaults, in drive LOCKSTEP: everything is done by the calling thread. */
+hap_status peers_run_session(bench *b, const peer_world *world, double physics_hz, bool may_sleep,
+                             peers_run *out);
+
+void peers_run_free(peers_run *run); /* zeroed allowed */
+
+/* RMS of the difference / RMS of the truth; NaN without a truth. */
+double peers_run_error(const peers_run *run, const peers_run *truth);
+
+double peers_run_peak(const peers_run *run);
+
+/* N, the force when the hand is this deep beyond where the box began: friction still holds it. */
+#define PEERS_FIRST_DEPTH 2e-4 /* m */
+double peers_run_first(const peer_world *world, const peers_run *run);
+
+#endif
