@@ -30,7 +30,8 @@ HAP_BEGIN_DECLS
 
 /* [physics] Whether a and b collide. io arrives with mode dContactApprox1 and mu = infinity:
  * fill in the surface of the pair. Called once for each pair and step, never in testing
- * simulations. With Approx1 the loop of model CONTACT takes a mu above 10 as 10 (84 degrees). */
+ * simulations, and not for pairs that sleep where most of the world does. With Approx1 the loop of
+ * model CONTACT takes a mu above 10 as 10 (84 degrees). */
 typedef bool (*hap_surface_fn)(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io);
 
 /* [physics] First friction direction (world axes, any length) of a pair whose surface has

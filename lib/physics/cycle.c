@@ -127,6 +127,20 @@ static void global_step(hapi_physics *physics)
   }
 }
 
+/* Testing simulations of a body that sleeps need its contacts. */
+static void collide_near(hapi_physics *physics)
+{
+  const hapi_slots *slots = &physics->near.slots;
+  for (uint32_t i = 0; i < slots->body_high; ++i) {
+    const hapi_body_slot *slot = &slots->bodies[i];
+    dBodyID body =
+        slot->phase == HAPI_SLOT_FREE ? NULL : hapi_account_body(&physics->account, slot);
+    if (body != NULL && !slot->loop_owned) {
+      hapi_world_collide_also(&physics->world, &physics->cycle, physics->probe.reuse.wanted, body);
+    }
+  }
+}
+
 static bool call_step(hapi_physics *physics, hap_step_fn callback)
 {
   if (callback == NULL || !(physics->cycle.step_s > 0.0)) {
@@ -360,6 +374,7 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_reconcile_residual(&physics->account);
   hapi_reconcile_overwrite(&physics->account);
   hapi_neighbors_find(&physics->near);
+  collide_near(physics);
   seconds[1] += stopwatch_lap(&watch) - physics->near.range.links.cover.boxes_s;
   seconds[0] +=
       physics->near.range.links.cover.boxes_s; /* which the next collision phase finds done */

@@ -146,8 +146,18 @@ typedef struct collision {
   const hapi_world *world;
   const hapi_cycle *cycle;
   bool notes;
+  bool alone;  /* of one body of world->awake */
+  uint32_t at; /* its place there */
   uint32_t rejected;
 } collision;
+
+/* A pair of two bodies that are awake was met from the first of them. */
+static bool was_met(const collision *c, dBodyID a, dBodyID b)
+{
+  const hapi_awake *awake = &c->world->awake;
+  dBodyID other = awake->bodies[c->at] == a ? b : a;
+  return other != NULL && hapi_awake_find(awake, other) < c->at;
+}
 
 static void near_callback(void *data, dGeomID a, dGeomID b)
 {
@@ -158,7 +168,8 @@ static void near_callback(void *data, dGeomID a, dGeomID b)
   }
   dBodyID body_a = dGeomGetBody(a);
   dBodyID body_b = dGeomGetBody(b);
-  if (body_a == body_b || (!can_move(body_a) && !can_move(body_b))) {
+  if (body_a == body_b || (!can_move(body_a) && !can_move(body_b)) ||
+      (c->alone && was_met(c, body_a, body_b))) {
     return;
   }
   dSurfaceParameters surface;
@@ -203,13 +214,93 @@ static void collide_spaces(collision *c, const hapi_spaces *spaces)
   }
 }
 
-void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes)
+/* HAPI_NONE: none of those that collide, or one inside of such a space. */
+static uint32_t space_of(const hapi_spaces *spaces, dGeomID geom)
 {
-  collision c = {world, cycle, notes, 0};
+  for (uint32_t i = 0; i < spaces->count; ++i) {
+    if (spaces->list[i].space == dGeomGetSpace(geom)) {
+      return i;
+    }
+  }
+  return HAPI_NONE;
+}
+
+/* The pairs of one geom, as collide_spaces would find them. False: they depend on spaces inside
+ * spaces. */
+static bool collide_geom(collision *c, dGeomID geom)
+{
+  const hapi_spaces *spaces = &c->world->spaces;
+  uint32_t own = space_of(spaces, geom);
+  if (own == HAPI_NONE) {
+    return dGeomGetSpace(geom) == NULL; /* then it meets nothing */
+  }
+  for (uint32_t i = 0; i < spaces->count; ++i) {
+    uint32_t both = spaces->list[i].pairs & spaces->list[own].pairs;
+    if ((both & (i == own ? HAP_SPACE_INSIDE : HAP_SPACE_OTHERS)) != 0) {
+      dSpaceCollide2(geom, (dGeomID)spaces->list[i].space, c, near_callback);
+    }
+  }
+  return true;
+}
+
+/* The bodies of world->awake from a place on, and what they wake. False: too many. */
+static bool collide_awake(collision *c, hapi_awake *awake, uint32_t from)
+{
+  bool good = true;
+  c->alone = true;
+  for (c->at = from; good && c->at < awake->count; ++c->at) {
+    dBodyID body = awake->bodies[c->at];
+    for (dGeomID g = dBodyGetFirstGeom(body); g != NULL && good; g = dBodyGetNextGeom(g)) {
+      good = !dGeomIsEnabled(g) || collide_geom(c, g);
+    }
+    good = good && hapi_awake_add_partners(awake, body);
+  }
+  c->alone = false;
+  if (!good) {
+    hapi_awake_end(awake);
+  }
+  return good;
+}
+
+static void contacts_drop(const hapi_world *world)
+{
   dJointGroupEmpty(world->contact_group);
-  hapi_world_forget_surfaces(world);
   world->notes->count = 0;
   world->notes->softened = false;
-  collide_spaces(&c, &world->spaces);
+}
+
+static void collide_all(collision *c)
+{
+  c->rejected = 0;
+  contacts_drop(c->world);
+  collide_spaces(c, &c->world->spaces);
+}
+
+void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes)
+{
+  collision c = {.world = world, .cycle = cycle, .notes = notes};
+  hapi_world_forget_surfaces(world);
+  contacts_drop(world);
+  if (!hapi_awake_begin(world) || !collide_awake(&c, &world->awake, 0)) {
+    collide_all(&c);
+  }
+  world->counts.contacts_rejected += c.rejected;
+}
+
+void hapi_world_collide_also(hapi_world *world, const hapi_cycle *cycle, bool notes, dBodyID body)
+{
+  hapi_awake *awake = &world->awake;
+  collision c = {.world = world, .cycle = cycle, .notes = notes};
+  uint32_t from = awake->count;
+  if (!awake->alone || hapi_awake_find(awake, body) != HAPI_NONE) {
+    return;
+  }
+  bool room = hapi_awake_add(awake, body);
+  if (!room) {
+    hapi_awake_end(awake);
+  }
+  if (!room || !collide_awake(&c, awake, from)) {
+    collide_all(&c);
+  }
   world->counts.contacts_rejected += c.rejected;
 }

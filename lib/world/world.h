@@ -10,6 +10,7 @@
 
 #include <hapode/ode.h>
 
+#include "world/awake.h"
 #include "world/bodies.h"
 #include "world/carriers.h"
 #include "world/claim.h"
@@ -57,6 +58,7 @@ struct hapi_world {
   hapi_spaces spaces;
   bool said_space; /* that one was destroyed */
   hapi_body_table bodies;
+  hapi_awake awake;
   hapi_carriers carriers;
   hapi_joint_table joints;
   hapi_surface_cache *surfaces;
@@ -115,8 +117,11 @@ typedef struct hapi_touching {
   dBodyID bodies[2]; /* NULL: the static world */
 } hapi_touching;
 
-/* Contact joints for the next step. notes: each with a note. */
+/* Contact joints for the next step, after a scan. notes: each with a note. Where most of the world
+ * sleeps, those of bodies that are awake or will be woken by the step. */
 void hapi_world_collide(hapi_world *world, const hapi_cycle *cycle, bool notes);
+/* Those of one more body, and of all that hangs on it, unless they are there. */
+void hapi_world_collide_also(hapi_world *world, const hapi_cycle *cycle, bool notes, dBodyID body);
 /* Contact joints of two geoms; notes as above. Returns how many were rejected. */
 uint32_t hapi_world_make_contacts(const hapi_world *world, const hapi_cycle *cycle,
                                   const hapi_touching *touching, dSurfaceParameters *surface,
