@@ -25,6 +25,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "own_device": "docs/writing-a-device.md",
     "own_forces": "docs/forces.md",
     "sandpaper_and_ice": "docs/surfaces.md",
+    "ribs": "docs/surfaces.md",
     "tap_materials": "docs/surfaces.md",
     "fridge_magnet": "docs/surfaces.md",
     "push_without_ode": "docs/scene.md",
@@ -174,6 +175,13 @@ def check_sandpaper_and_ice(program):
     point(rubs["sandpaper"] > 10 * rubs["ice"] > 10 * rubs["foam"], "sandpaper rubs", str(rubs))
     last = float(rows[-1][1]) if rows else 0.0
     point(0.5 < last < 1.0, "foam is soft", f"{last} N")
+
+
+def check_ribs(program):
+    out = run(program)
+    rows = rows_of(out, r"^(\d+) ribs a metre: (\d+) felt on (\d+) mm, function in time$")
+    point(len(rows) == 2 and all(abs(int(felt) - 1e-3 * int(a_metre) * int(way)) <= 1.5
+                                 for a_metre, felt, way in rows), "each rib is felt", out)
 
 
 def check_tap_materials(program):

@@ -52,9 +52,10 @@ typedef struct hap_surface {
 
 /* [haptic] m, -0.003..0.003: the height of a surface over a geom, at a point of the geom's frame;
  * of a plane that of the world. What is beyond the bounds is cut off. It is called in the tick,
- * five times for each contact: its time is the tick's. It must give the same for the same point, in
- * any thread, and neither wait, allocate nor call the system. A height that is not finite is
- * HAP_FAULT_FORCE. */
+ * five times for each contact: the tick waits for it. Where it takes longer than call_most_s of
+ * hap_texture_def again and again, it is not called any more. It must give the same for the same
+ * point, in any thread, and neither wait, allocate nor call the system. A height that is not finite
+ * is HAP_FAULT_FORCE. */
 typedef double (*hap_height_fn)(void *arg, const double point[3]);
 
 /* A texture: heights of a surface over a geom, felt as force along and across it. A patch of
@@ -77,6 +78,9 @@ typedef struct hap_texture_def {
 
   hap_height_fn height; /* without heights; default NULL */
   void *arg;            /* handed to it; the caller's, until the session is destroyed */
+  /* s, 0..0.5 of a haptic period, that all calls of height of a tick may take; 0 (default): 0.1 of
+   * the period */
+  double call_most_s;
 } hap_texture_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
@@ -88,6 +92,25 @@ HAP_API void hap_texture_def_init(hap_texture_def *def, size_t size_of_def);
 HAP_NODISCARD HAP_API hap_status hap_session_add_texture(hap_session *session,
                                                          const hap_texture_def *def,
                                                          uint32_t *out_texture);
+
+/* How the function of a texture does, since hap_session_start. It has a size and may grow at its
+ * end. A texture of samples has 0 everywhere. Times are wall-clock, also in LOCKSTEP. */
+typedef struct hap_texture_state {
+  uint32_t size;       /* bytes filled in */
+  uint32_t is_out;     /* 1: it was too late, and its geoms are smooth */
+  uint64_t ticks;      /* that called it */
+  uint64_t late_ticks; /* those in which it took longer than call_most_s */
+  double us_mean;      /* us, of all calls of a tick */
+  double us_max;
+} hap_texture_state;
+
+/* [any] State of a texture. size_of_out: sizeof *out of the caller's build. HAP_END: its function
+ * took longer than call_most_s for the third time within about a second, or longer than 35 ms, and
+ * is not called any more until the session is started again. HAP_EVENT_TEXTURE_OUT and the log tell
+ * that, too. In drive LOCKSTEP time is measured and not judged; a replay has it from the recording.
+ * HAP_ERROR_NOT_FOUND: no such texture. HAP_ERROR_ARGUMENT: a NULL, or no room for the size. */
+HAP_API hap_status hap_session_get_texture(hap_session *session, uint32_t texture,
+                                           hap_texture_state *out, size_t size_of_out);
 
 HAP_END_DECLS
 

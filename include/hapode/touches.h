@@ -91,9 +91,10 @@ typedef enum hap_event_kind {
   HAP_EVENT_FAULT = 7,  /* the guard has taken the force away */
   /* A gripper has closed or opened: see hap_pointer_outputs.gripper_closed. It begins open. */
   HAP_EVENT_GRIPPER = 8,
-  HAP_EVENT_FORCE_OUT = 10, /* the call of an own force was taken out (forces.h) */
-  HAP_EVENT_HOLD = 11,      /* the pointer holds a body (grab.h) */
-  HAP_EVENT_LET_GO = 12     /* it does no more */
+  HAP_EVENT_FORCE_OUT = 10,  /* the call of an own force was taken out (forces.h) */
+  HAP_EVENT_HOLD = 11,       /* the pointer holds a body (grab.h) */
+  HAP_EVENT_LET_GO = 12,     /* it does no more */
+  HAP_EVENT_TEXTURE_OUT = 13 /* the function of a texture is too late (surface.h) */
 } hap_event_kind;
 
 /* Something that has happened. Its size goes with the call; it may grow at its end. What a kind
@@ -101,10 +102,10 @@ typedef enum hap_event_kind {
 typedef struct hap_event {
   uint32_t kind; /* hap_event_kind */
   /* BUTTON, GRIPPER (its axis): from 0; FAULT: hap_fault; FORCE_OUT: hap_force_out;
-   * LET_GO: hap_grab_end */
+   * LET_GO: hap_grab_end; TEXTURE_OUT: of hap_session_add_texture */
   uint32_t number;
   int64_t time_ns;        /* of the tick, on the clock of hap_session_now */
-  hap_pointer_id pointer; /* FAULT: v is 0 where it came from none */
+  hap_pointer_id pointer; /* FAULT: v is 0 where it came from none; TEXTURE_OUT: 0 */
   void *geom;             /* as in hap_touch; NULL for BUTTON and all kinds behind it */
   void *body;
   double point[3];  /* m, world; HOLD, LET_GO: of the pointer */

@@ -270,7 +270,7 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     hapi_ramp *r = &c->ramp;
     double share = c->hidden ? 0.0 : r->share * p->guard.felt;
     double stiffness = hapi_touch_stiffness(c, p);
-    double depth = r->depth + (c->feel.special ? c->feel.lift : 0.0);
+    double depth = r->depth + (c->feel.special ? c->feel.lift.height : 0.0);
     double strain = hapi_touch_strain(c, depth - r->excess);
     double energy = spring_energy(p, c->weight * share * stiffness, strain);
     double rubs = c->feel.mu > 0.0 ? hapi_friction_energy(touches, tick, c) : 0.0;

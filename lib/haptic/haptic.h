@@ -13,6 +13,7 @@
 #include <hapode/pointer.h>
 #include <hapode/session.h>
 #include <hapode/stats.h>
+#include <hapode/surface.h>
 #include <hapode/touches.h>
 #include <hapode/trace.h>
 
@@ -22,6 +23,7 @@
 #include "haptic/own_list.h"
 #include "record/tape.h"
 #include "sync/exchange.h"
+#include "sync/texture.h"
 
 typedef struct hapi_haptic hapi_haptic;
 
@@ -33,6 +35,7 @@ typedef struct hapi_haptic_config {
   uint32_t trace_rows;
   hap_guard guard;
   hapi_exchange *exchange;
+  const hapi_textures *textures; /* NULL: there are none */
 } hapi_haptic_config;
 
 hap_status hapi_haptic_create(const hapi_haptic_config *config, hapi_haptic **out);
@@ -108,6 +111,9 @@ hap_status hapi_haptic_remove_force(hapi_haptic *haptic, hap_pointer_id id, hap_
                                     hap_detail *detail);
 hap_status hapi_haptic_get_force(hapi_haptic *haptic, hap_pointer_id id, hap_force_id force,
                                  hap_force_state *out);
+
+/* [any] surface.h. number: of a texture that there is. */
+void hapi_haptic_get_texture(const hapi_haptic *haptic, uint32_t number, hap_texture_state *out);
 
 /* [any] grab.h. birth 0: what is held is let go. HAP_SATURATED: something was cut to what the
  * device can hold. */

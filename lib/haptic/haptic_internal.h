@@ -20,7 +20,6 @@
 #include "haptic/haptic.h"
 #include "haptic/outputs_box.h"
 #include "haptic/own_hands.h"
-#include "haptic/own_list.h"
 #include "haptic/settings_box.h"
 #include "record/tape.h"
 #include "sync/triple_buffer.h"
@@ -162,6 +161,7 @@ typedef struct hapi_told_things {
   hap_touch *touches;         /* HAP_TOUCHES_MAX for each place of each pointer's buffer */
   hap_body_contact *contacts; /* likewise capacity.contacts for each place */
   hapi_own_hands hands;
+  hapi_texture_times textures;
 } hapi_told_things;
 
 /* What watchdogs see of the loop and tell it. */
@@ -240,6 +240,7 @@ void hapi_tape_begun(hapi_haptic *haptic);
 void hapi_tape_tick(hapi_haptic *haptic, int64_t now_ns);
 void hapi_tape_calls(hapi_haptic *haptic, hapi_loop_calls *io);
 void hapi_tape_standstill(hapi_haptic *haptic, hapi_loop_standstill *io);
+void hapi_tape_textures(hapi_haptic *haptic, uint64_t *io_out);
 void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches);
 void hapi_tape_join(hapi_haptic *haptic, uint32_t index);
 void hapi_tape_leave(hapi_haptic *haptic, uint32_t index, bool pauses);
@@ -263,7 +264,7 @@ void hapi_loop_sample_begin(hapi_haptic *haptic);
 void hapi_loop_sample_end(hapi_haptic *haptic, int64_t spent_ns);
 void hapi_loop_note_effects(hapi_haptic *haptic); /* after a model was adopted */
 
-/* told.c: what the application hears of a tick */
+/* told.c */
 bool hapi_told_create(hapi_haptic *haptic); /* false: no memory; destroy is due all the same */
 void hapi_told_destroy(hapi_haptic *haptic);
 void hapi_told_reset(hapi_haptic *haptic);                   /* a session begins */

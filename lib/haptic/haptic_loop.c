@@ -13,6 +13,7 @@
 #include "haptic/grabs.h"
 #include "haptic/own_call.h"
 #include "haptic/own_forces.h"
+#include "haptic/texture_time.h"
 #include "haptic/tick_memory.h"
 #include "tick/report.h"
 
@@ -147,6 +148,7 @@ static void state_report(hapi_haptic *haptic)
   state->derated = haptic->tick.guard.late.derated_ticks > 0;
   state->swings = haptic->tick.guard.oscillation_ticks > 0;
   state->force_out = haptic->told.hands.out;
+  state->texture_out = haptic->tick.touches.textures.out != 0;
   state->unsolved = haptic->tick.rows.unsolved_most;
   hapi_exchange_state_publish(haptic->config.exchange);
 }
@@ -172,6 +174,7 @@ hap_status hapi_haptic_begin(hapi_haptic *haptic, int64_t start_ns, hap_detail *
   memset(&haptic->time.load, 0, sizeof haptic->time.load);
   memset(&haptic->time.work, 0, sizeof haptic->time.work);
   hapi_grabs_reset(haptic);
+  hapi_texture_time_begin(haptic);
   hap_status status = hapi_pointers_start_devices(haptic, detail);
   if (status < HAP_OK) {
     return status;
@@ -367,6 +370,7 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   }
   hapi_pointers_follow(haptic);
   hapi_own_follow(haptic, now_ns);
+  hapi_texture_time_follow(haptic);
   calls_follow(haptic);
   messages_receive(haptic, now_ns);
   hapi_pointers_read(haptic, now_ns);
@@ -378,6 +382,9 @@ void hapi_haptic_cycle(hapi_haptic *haptic, int64_t now_ns)
   }
   hapi_tick_answer(&haptic->tick);
   hapi_pointers_write(haptic);
+  if (haptic->tick.touches.textures.called != 0) {
+    hapi_texture_time_judge(haptic);
+  }
   hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_TICK, 0);
   if (haptic->tape != NULL) {
     uint64_t recording = hapi_effect_begin(&haptic->tick.sample);

@@ -59,17 +59,6 @@ static void hands_fill(hapi_haptic *haptic)
 
 /* ---- what it did ---- */
 
-static void figures_note(hapi_own_caller *caller, int64_t spent_ns)
-{
-  bool late = spent_ns > caller->of.most_ns;
-  int64_t most_ns = atomic_load_explicit(&caller->most_ns, memory_order_relaxed);
-  atomic_fetch_add_explicit(&caller->calls, 1, memory_order_relaxed);
-  atomic_fetch_add_explicit(&caller->late, late, memory_order_relaxed);
-  atomic_fetch_add_explicit(&caller->spent_ns, spent_ns, memory_order_relaxed);
-  atomic_store_explicit(&caller->most_ns, spent_ns > most_ns ? spent_ns : most_ns,
-                        memory_order_relaxed);
-}
-
 bool hapi_own_call_is_late(hapi_own_caller *caller, int64_t spent_ns, double seconds)
 {
   caller->strikes = hapi_max(caller->strikes - HAPI_SAFETY_CALL_FORGET * seconds, 0.0);
@@ -94,7 +83,7 @@ static void call_one(hapi_haptic *haptic, uint32_t index, hapi_own_caller *calle
   caller->of.call(caller->of.user, &tick, &wrench);
   int64_t spent_ns = hapi_clock_now() - begin_ns;
   hapi_pulse_beat(&haptic->standstill.pulse, HAPI_PHASE_TICK, 0);
-  figures_note(caller, spent_ns);
+  hapi_own_call_note(caller, spent_ns);
   bool judged = !haptic->config.lockstep;
   if (!hapi_guard_usable(&wrench)) {
     out->out = HAP_FORCE_OUT_NOT_FINITE;

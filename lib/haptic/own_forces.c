@@ -14,20 +14,6 @@ static hapi_own_force *own_of(hapi_haptic *haptic, uint32_t index)
   return &haptic->tick.own[(size_t)index * HAP_FORCES_MAX];
 }
 
-static void caller_begin(hapi_haptic *haptic, hapi_own_caller *caller, const hapi_own_call *call,
-                         uint32_t number)
-{
-  haptic->told.hands.any = haptic->told.hands.any || call->call != NULL;
-  caller->of = *call;
-  caller->strikes = 0.0;
-  atomic_store(&caller->out, HAP_FORCE_IN);
-  atomic_store(&caller->calls, 0);
-  atomic_store(&caller->late, 0);
-  atomic_store(&caller->spent_ns, 0);
-  atomic_store(&caller->most_ns, 0);
-  atomic_store(&caller->number, number);
-}
-
 /* Samples are taken one set a tick: what a tick puts on the tape has a bound. */
 static void list_take(hapi_haptic *haptic, uint32_t index, int64_t now_ns, bool *io_samples)
 {
@@ -48,7 +34,8 @@ static void list_take(hapi_haptic *haptic, uint32_t index, int64_t now_ns, bool 
     }
     *io_samples = *io_samples || setup->wave.sample_count > 0;
     hapi_own_force_change(&own[k], setup, message->samples[k], now_ns);
-    caller_begin(haptic, &list->callers[k], &message->calls[k], setup->number);
+    haptic->told.hands.any = haptic->told.hands.any || message->calls[k].call != NULL;
+    hapi_own_caller_begin(&list->callers[k], &message->calls[k], setup->number);
     hapi_tape_own(haptic, index, k, setup, message->samples[k]);
   }
   haptic->tick.pointers.of[index].own = hapi_own_forces_any(own);

@@ -7,6 +7,9 @@
 
 #include <hapode/forces.h>
 
+#include "haptic/own_list.h"
+#include "sync/texture.h"
+
 /* What calls of own forces are told of a tick: rooms for it, for each pointer. */
 typedef struct hapi_own_hands {
   bool any;     /* there has been a call since the begin */
@@ -16,5 +19,12 @@ typedef struct hapi_own_hands {
   const hap_force_hand **list;
   const hap_touch **touches; /* HAP_TOUCHES_MAX for each */
 } hapi_own_hands;
+
+/* Functions of textures, each at the texture's number - 1. */
+typedef struct hapi_texture_times {
+  hapi_own_caller callers[HAPI_TEXTURES];
+  int64_t called_ns[HAPI_TEXTURES]; /* the tick that called it last */
+  uint64_t out;                     /* a bit each, from the next tick on */
+} hapi_texture_times;
 
 #endif

@@ -164,3 +164,41 @@ hap_status hapi_own_list_remove(hapi_own_list *list, hap_force_id force)
   (void)waves_sweep(list);
   return HAP_OK;
 }
+
+/* ---- the loop's side of a function ---- */
+
+void hapi_own_caller_begin(hapi_own_caller *caller, const hapi_own_call *call, uint32_t number)
+{
+  caller->of = *call;
+  caller->strikes = 0.0;
+  atomic_store(&caller->out, HAP_FORCE_IN);
+  atomic_store(&caller->calls, 0);
+  atomic_store(&caller->late, 0);
+  atomic_store(&caller->spent_ns, 0);
+  atomic_store(&caller->most_ns, 0);
+  atomic_store(&caller->number, number);
+}
+
+void hapi_own_caller_tell(const hapi_own_caller *caller, hap_force_state *out)
+{
+  uint64_t calls = atomic_load(&caller->calls);
+  *out = (hap_force_state){.size = sizeof *out,
+                           .out = atomic_load(&caller->out),
+                           .calls = calls,
+                           .late_calls = atomic_load(&caller->late),
+                           .us_max = 1e-3 * (double)atomic_load(&caller->most_ns)};
+  if (calls > 0) {
+    out->us_mean = 1e-3 * (double)atomic_load(&caller->spent_ns) / (double)calls;
+  }
+}
+
+void hapi_own_call_note(hapi_own_caller *caller, int64_t spent_ns)
+{
+  bool late = spent_ns > caller->of.most_ns;
+  int64_t most_ns = atomic_load_explicit(&caller->most_ns, memory_order_relaxed);
+  atomic_fetch_add_explicit(&caller->calls, 1, memory_order_relaxed);
+  atomic_fetch_add_explicit(&caller->late, late, memory_order_relaxed);
+  atomic_fetch_add_explicit(&caller->spent_ns, spent_ns, memory_order_relaxed);
+  atomic_store_explicit(&caller->most_ns, spent_ns > most_ns ? spent_ns : most_ns,
+                        memory_order_relaxed);
+}

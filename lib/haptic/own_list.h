@@ -88,4 +88,11 @@ bool hapi_own_list_calls(const hapi_own_list *list, hap_force_id force);
 float *hapi_own_list_room(hapi_own_list *list, uint32_t count);
 void hapi_own_list_give_back(hapi_own_list *list, const float *samples);
 
+/* Another function is set: its figures begin. */
+void hapi_own_caller_begin(hapi_own_caller *caller, const hapi_own_call *call, uint32_t number);
+
+/* After a call: its figures; [any] what they come to. */
+void hapi_own_call_note(hapi_own_caller *caller, int64_t spent_ns);
+void hapi_own_caller_tell(const hapi_own_caller *caller, hap_force_state *out);
+
 #endif

@@ -177,13 +177,7 @@ hap_status hapi_haptic_get_force(hapi_haptic *haptic, hap_pointer_id id, hap_for
     const hapi_own_caller *caller = &slot->own.callers[place];
     /* Else the loop has not taken it. */
     if (atomic_load(&caller->number) == slot->own.wanted.setups[place].number) {
-      uint64_t calls = atomic_load(&caller->calls);
-      out->out = atomic_load(&caller->out);
-      out->calls = calls;
-      out->late_calls = atomic_load(&caller->late);
-      out->us_max = 1e-3 * (double)atomic_load(&caller->most_ns);
-      out->us_mean =
-          calls > 0 ? 1e-3 * (double)atomic_load(&caller->spent_ns) / (double)calls : 0.0;
+      hapi_own_caller_tell(caller, out);
     }
   }
   pthread_mutex_unlock(&slot->lock);

@@ -87,6 +87,15 @@ void hapi_tape_standstill(hapi_haptic *haptic, hapi_loop_standstill *io)
   }
 }
 
+void hapi_tape_textures(hapi_haptic *haptic, uint64_t *io_out)
+{
+  if (hapi_tape_records(haptic->tape)) {
+    haptic->note->u[HAPI_TICK_TEXTURES] = *io_out;
+  } else if (hapi_tape_plays(haptic->tape)) {
+    *io_out = haptic->tick_cell->u[HAPI_TICK_TEXTURES];
+  }
+}
+
 /* Not before the first tick: there all that is there is taken. */
 void hapi_tape_taken(hapi_haptic *haptic, bool model, bool patches)
 {

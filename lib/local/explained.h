@@ -45,7 +45,7 @@ static inline void hapi_contact_explain(hapi_pointer *p, const hapi_local_contac
                                         const hapi_local_body *body, double period)
 {
   hapi_explained *e = &p->guard.change.explained;
-  depth += c->feel.special ? c->feel.lift : 0.0;
+  depth += c->feel.special ? c->feel.lift.height : 0.0;
   double k = c->weight * (p->rigid ? p->coupling.stiffness : hapi_touch_stiffness(c, p));
   double d = !hapi_touch_acts(c, depth)
                  ? 0.0
@@ -56,7 +56,7 @@ static inline void hapi_contact_explain(hapi_pointer *p, const hapi_local_contac
     e->world += c->weight * added * fmax(depth, 0.0);
   }
   if (c->feel.special) {
-    double push = hapi_v3_norm(c->feel.push) + c->feel.turned; /* now or before, at most */
+    double push = hapi_v3_norm(c->feel.lift.push) + c->feel.turned; /* now or before, at most */
     e->world += k * (push * c->feel.lifted + fmax(depth, 0.0) * c->feel.turned);
     e->world += 2.0 * d * push * c->feel.turned * hapi_sum_of_sizes(p->twist.linear);
     k *= push;

@@ -11,6 +11,15 @@
 #include "pointer/declared.h"
 #include "sync/messages.h"
 
+/* What a texture makes of a contact. */
+typedef struct hapi_touch_lift {
+  double height;   /* m, that the texture is above the geom */
+  double push[3];  /* along which it pushes: the unit normal less the slope of the texture */
+  double slope[3]; /* that slope, world */
+  double left;     /* m, and the slope: of a texture that goes, when it went */
+  double left_slope[3];
+} hapi_touch_lift;
+
 /* How a contact is felt in this tick. */
 typedef struct hapi_touch_feel {
   bool rubs;       /* friction is worked out: there is some, or it was asked for */
@@ -20,12 +29,11 @@ typedef struct hapi_touch_feel {
   double mu;
   double stiffness; /* N/m */
   double damping;   /* N s/m */
-  double lift;      /* m, that the texture is above the geom */
-  double push[3];   /* along which it pushes: the unit normal less the slope of the texture */
-  double lifted;    /* m, by which lift has changed since the tick before, whatever its sign */
-  double turned;    /* the same of push: sum over its parts */
-  bool sticks;      /* the spring pulls too: */
-  double pull;      /* N, at most, of this contact alone; 0 where it does not */
+  hapi_touch_lift lift;
+  double lifted; /* m, by which its height has changed since the tick before, whatever its sign */
+  double turned; /* the same of push: sum over its parts */
+  bool sticks;   /* the spring pulls too: */
+  double pull;   /* N, at most, of this contact alone; 0 where it does not */
 } hapi_touch_feel;
 
 #define HAPI_FEEL_SAID (-1.0) /* stiffness of a pair that has just come */
@@ -62,6 +70,8 @@ typedef struct hapi_pair_feel {
   double stiffness; /* N/m: on its way to what is said */
   const hapi_texture *texture;
   double lift_share; /* 0..1, of a texture that comes in */
+  bool parts;        /* in this tick another texture went */
+  double left_share; /* 0..1, of it */
   hapi_pair_hold hold;
   hapi_pair_magnet magnet;
 } hapi_pair_feel;

@@ -477,7 +477,7 @@ static __attribute__((noinline, cold)) void contact_feel(const hapi_tick_facts *
 {
   const hapi_feel_place place = {at->pointer, at->body, at->normal, at->point, at->share};
   hapi_touch_feel_follow(touches, facts, &place, c, &at->depth);
-  at->push = c->feel.push;
+  at->push = c->feel.lift.push;
 }
 
 void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointers,

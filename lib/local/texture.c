@@ -121,3 +121,20 @@ double hapi_texture_height(const hapi_texture *t, const double point[3], const d
   return t->heights != NULL ? patch_height(t, point, out_slope)
                             : function_height(t, point, normal, out_slope);
 }
+
+int64_t hapi_texture_begin(const hapi_texture_calls *calls, const hapi_texture *t)
+{
+  return t->heights == NULL && calls->clock != NULL ? calls->clock() : 0;
+}
+
+void hapi_texture_end(hapi_texture_calls *calls, const hapi_texture *t, uint32_t number,
+                      int64_t begin_ns)
+{
+  HAPI_ASSERT_INDEX(number - 1, HAPI_TEXTURES);
+  if (t->heights == NULL && calls->clock != NULL) {
+    uint64_t bit = hapi_texture_bit(number);
+    int64_t before_ns = (calls->called & bit) != 0 ? calls->spent_ns[number - 1] : 0;
+    calls->spent_ns[number - 1] = before_ns + (calls->clock() - begin_ns);
+    calls->called |= bit;
+  }
+}

@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "local/pair_feel.h"
+#include "local/texture.h"
 #include "proximity/constrained_ball.h"
 #include "sync/messages.h"
 
@@ -204,6 +205,8 @@ typedef struct hapi_kept_touch {
   uint32_t epoch; /* of the body */
   hapi_ramp ramp;
   hapi_constrained_ball ball;
+  bool special; /* then: */
+  hapi_touch_lift lift;
 } hapi_kept_touch;
 
 typedef struct hapi_touches {
@@ -219,7 +222,8 @@ typedef struct hapi_touches {
   hapi_pair_feel *feels;     /* capacity.feels */
   hapi_pair_feel *old_feels; /* scratch of adopting */
   uint32_t feel_count;
-  bool magnets;     /* some surface pulls in this tick */
+  bool magnets; /* some surface pulls in this tick */
+  hapi_texture_calls textures;
   uint32_t unsound; /* index + 1 of a pointer that touches a texture without height; 0: none */
   hapi_triangle *triangles; /* of the model, each in its body's frame; capacity.triangles */
   uint64_t contact_ticks;   /* in which something pushed; this and the next since start */

@@ -23,7 +23,11 @@ static void touches_keep(const hapi_touches *touches)
                                                .body = c->body,
                                                .epoch = c->epoch,
                                                .ramp = c->ramp,
-                                               .ball = c->ball};
+                                               .ball = c->ball,
+                                               .special = c->feel.special};
+    if (c->feel.special) {
+      touches->kept[c->slot].lift = c->feel.lift;
+    }
   }
 }
 
@@ -55,6 +59,7 @@ static void contact_adopt(hapi_touches *touches, const hapi_bodies *bodies,
     out->seen = true;
     out->ramp = kept->ramp;
     out->ball = kept->ball;
+    out->feel.lift = kept->lift;
     out->ball.known &= kept->epoch == out->epoch; /* else the body was put elsewhere */
     if (kept->body == HAPI_SLOT_NONE && in->body != HAPI_SLOT_NONE) {
       const hap_pose *frame = hapi_body_frame_at_begin(bodies, in->body);

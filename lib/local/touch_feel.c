@@ -46,6 +46,9 @@ void hapi_touch_feel_find(const hapi_touches *touches, hapi_local_contact *c)
   c->feel.pair = c->feel.special ? pair : 0;
   c->feel.sticks = c->feel.special && c->feel.sticks;
   c->feel.pull = c->feel.sticks ? c->feel.pull : 0.0;
+  if (!c->feel.special) {
+    memset(&c->feel.lift, 0, sizeof c->feel.lift);
+  }
 }
 
 void hapi_touch_feel_adopt(hapi_touches *touches, const hapi_feel_told *told, hapi_local_contact *c)

@@ -33,7 +33,7 @@ static inline double hapi_touch_softer(const hapi_local_contact *c, const hapi_p
 /* Along which the contact pushes the pointer, by its force along the geom's normal. */
 static inline const double *hapi_touch_push(const hapi_local_contact *c)
 {
-  return c->feel.special ? c->feel.push : c->normal_now;
+  return c->feel.special ? c->feel.lift.push : c->normal_now;
 }
 
 /* N, the normal force that friction goes by, before friction is added: with what sticks. */

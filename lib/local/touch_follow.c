@@ -32,16 +32,22 @@ static void stiffness_follow(hapi_pair_feel *pair, const hapi_pointer *p, double
       loaded ? hapi_min(hapi_max(wanted, pair->stiffness - most), pair->stiffness + most) : wanted;
 }
 
-/* Nor does a texture that comes under a contact that presses leap. */
-static void texture_follow(hapi_pair_feel *pair, double period)
+/* Nor does a texture that comes under a contact that presses leap, or one that goes. out: as of
+ * hapi_texture_calls. */
+static void texture_follow(hapi_pair_feel *pair, uint64_t out, double period)
 {
-  const hapi_texture *wanted = pair->in.feel.texture;
+  const hapi_feel *said = &pair->in.feel;
+  bool is_out = said->texture != NULL && (out & hapi_texture_bit(said->texture_number)) != 0;
+  const hapi_texture *wanted = is_out ? NULL : said->texture;
   bool loaded = pair->pressed || pair->hold.sticks;
-  if (wanted != pair->texture) {
+  double most = period / HAPI_SAFETY_CONTACT_RAMP_S;
+  pair->parts = wanted != pair->texture;
+  pair->left_share = loaded ? hapi_max(pair->left_share - most, 0.0) : 0.0;
+  if (pair->parts) {
     pair->texture = wanted;
     pair->lift_share = loaded ? 0.0 : 1.0;
+    pair->left_share = loaded ? 1.0 - most : 0.0;
   }
-  double most = period / HAPI_SAFETY_CONTACT_RAMP_S;
   pair->lift_share = loaded ? hapi_min(pair->lift_share + most, 1.0) : 1.0;
 }
 
@@ -93,7 +99,7 @@ static void magnet_pull(hapi_touches *touches, hapi_pair_feel *pair, const hapi_
     magnet_begin(pair, gap, period);
   }
   double share = at->share * hapi_magnet_share(gap * gap, said->magnet_reach);
-  hapi_v3_scale(share > 0.0 ? -magnet->strength * share * gap : 0.0, c->feel.push, force);
+  hapi_v3_scale(share > 0.0 ? -magnet->strength * share * gap : 0.0, c->feel.lift.push, force);
   hapi_v3_add(magnet->pull.force, force, magnet->pull.force);
   if (at->pointer->shape.hull != NULL) {
     hapi_v3_sub(at->point, at->pointer->pose.position, arm);
@@ -106,7 +112,8 @@ static void magnet_pull(hapi_touches *touches, hapi_pair_feel *pair, const hapi_
 }
 
 /* Once in each tick. */
-static void pair_follow(hapi_pair_feel *pair, const hapi_tick_facts *facts, const hapi_pointer *p)
+static void pair_follow(hapi_pair_feel *pair, uint64_t textures_out, const hapi_tick_facts *facts,
+                        const hapi_pointer *p)
 {
   if (pair->tick != facts->tick || pair->stiffness < 0.0) {
     pair->pressed = pair->presses && pair->tick + 1 == facts->tick;
@@ -118,7 +125,7 @@ static void pair_follow(hapi_pair_feel *pair, const hapi_tick_facts *facts, cons
     pair->tick = facts->tick;
     hold_follow(pair);
     stiffness_follow(pair, p, facts->period);
-    texture_follow(pair, facts->period);
+    texture_follow(pair, textures_out, facts->period);
   }
 }
 
@@ -220,7 +227,7 @@ static void slope_of_ball(const hapi_local_contact *c, const textured_spot *spot
  * the surface is what climbing costs, and no way round gives any energy. A hull's face on a corner
  * of the geom stays at one place of the texture: it has no slope. False: a height that is not
  * finite. */
-static bool contact_lift(const hapi_touches *touches, const hapi_pair_feel *pair,
+static bool contact_lift(hapi_touches *touches, const hapi_pair_feel *pair,
                          const hapi_feel_place *at, hapi_local_contact *c)
 {
   textured_spot spot;
@@ -231,11 +238,13 @@ static bool contact_lift(const hapi_touches *touches, const hapi_pair_feel *pair
   spot_find(at, &spot);
   hapi_pose_unpoint(geom->position, geom->quat_wxyz, spot.foot, point);
   hapi_quat_unrotate(geom->quat_wxyz, spot.normal, normal);
+  int64_t begin_ns = hapi_texture_begin(&touches->textures, pair->texture);
   double height = hapi_texture_height(pair->texture, point, normal, slope);
+  hapi_texture_end(&touches->textures, pair->texture, pair->in.feel.texture_number, begin_ns);
   if (!hapi_finite(&height, 1) || !hapi_finite(slope, 3)) {
     return false;
   }
-  c->feel.lift = pair->lift_share * height;
+  c->feel.lift.height = pair->lift_share * height;
   bool stays = c->tool != 0 && touches->tool.tools[c->tool - 1].in.at.touch == HAPI_TOUCH_FACE_A;
   if (stays) {
     return true;
@@ -248,8 +257,23 @@ static bool contact_lift(const hapi_touches *touches, const hapi_pair_feel *pair
     hapi_quat_rotate(at->body->pose.quat_wxyz, slope, slope);
   }
   hapi_v3_madd(slope, -hapi_v3_dot(slope, at->normal), at->normal, slope);
-  hapi_v3_madd(c->feel.push, -pair->lift_share, slope, c->feel.push);
+  hapi_v3_scale(pair->lift_share, slope, c->feel.lift.slope);
   return true;
+}
+
+/* What is left of a texture that has gone stays with the contact, less and less. */
+static void lift_leave(const hapi_pair_feel *pair, const hapi_touch_lift *before,
+                       const hapi_feel_place *at, hapi_touch_lift *io)
+{
+  double slope[3];
+  if (pair->parts) {
+    io->left = before->height;
+    hapi_v3_copy(before->slope, io->left_slope);
+  }
+  hapi_v3_copy(io->left_slope, slope);
+  hapi_v3_madd(slope, -hapi_v3_dot(slope, at->normal), at->normal, slope);
+  io->height += pair->left_share * io->left;
+  hapi_v3_madd(io->slope, pair->left_share, slope, io->slope);
 }
 
 void hapi_touch_feel_follow(hapi_touches *touches, const hapi_tick_facts *facts,
@@ -260,23 +284,29 @@ void hapi_touch_feel_follow(hapi_touches *touches, const hapi_tick_facts *facts,
   const hapi_feel *said = &pair->in.feel;
   const hapi_pointer *p = at->pointer;
   const hapi_touch_feel before = c->feel;
-  pair_follow(pair, facts, p);
+  pair_follow(pair, touches->textures.out, facts, p);
   c->feel.sticks = pair->hold.sticks;
   c->feel.pull = pair->hold.sticks ? at->share * said->adhesion : 0.0;
   c->feel.stiffness = pair->stiffness;
   c->feel.damping = (said->more & HAPI_FEEL_SPRING) != 0 ? said->damping : p->surface.damping;
   c->feel.mu = contact_slid(touches, facts, c) ? said->mu : said->mu_static;
-  c->feel.lift = 0.0;
-  hapi_v3_copy(at->normal, c->feel.push);
+  c->feel.lift.height = 0.0;
+  hapi_v3_set(c->feel.lift.slope, 0.0, 0.0, 0.0);
   if (pair->texture != NULL && !contact_lift(touches, pair, at, c)) {
     touches->unsound = c->pointer + 1;
   }
-  c->feel.lifted = pair->texture != NULL ? fabs(c->feel.lift - before.lift) : 0.0;
-  c->feel.turned = 0.0;
-  for (int i = 0; pair->texture != NULL && i < 3; ++i) {
-    c->feel.turned += fabs(c->feel.push[i] - before.push[i]);
+  bool leaves = pair->left_share > 0.0;
+  if (leaves) {
+    lift_leave(pair, &before.lift, at, &c->feel.lift);
   }
-  *io_depth += c->feel.lift;
+  hapi_v3_sub(at->normal, c->feel.lift.slope, c->feel.lift.push);
+  bool rough = pair->texture != NULL || leaves;
+  c->feel.lifted = rough ? fabs(c->feel.lift.height - before.lift.height) : 0.0;
+  c->feel.turned = 0.0;
+  for (int i = 0; rough && i < 3; ++i) {
+    c->feel.turned += fabs(c->feel.lift.push[i] - before.lift.push[i]);
+  }
+  *io_depth += c->feel.lift.height;
   /* What does not give has no depth. */
   bool pressed = p->rigid && hapi_v3_dot(c->force, at->normal) < 0.0;
   pair->hold.presses = pair->hold.presses || *io_depth > 0.0 || pressed;

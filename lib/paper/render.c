@@ -197,7 +197,7 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
   if (c->feel.special) {
     const hapi_feel_place place = {p, at.body, at.normal, at.point, c->hidden ? 0.0 : share};
     hapi_touch_feel_follow(touches, facts, &place, c, &depth);
-    at.push = c->feel.push;
+    at.push = c->feel.lift.push;
   }
   double force = c->hidden ? 0.0 : normal_force(facts, c, p, &at, share, depth);
   if ((force == 0.0 && !(c->feel.pull > 0.0)) || facts->faulted) {

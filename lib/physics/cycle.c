@@ -312,6 +312,11 @@ static void cycle_tell(hapi_physics *physics, double seconds)
                       : "the call of an own force takes too long: it is taken out "
                         "(hap_pointer_force_get)");
   }
+  if (cycle->state != NULL && cycle->state->texture_out) {
+    hapi_say_once(cycle, &physics->said.texture_out,
+                  "the function of a texture takes too long: it is felt as smooth from now on "
+                  "(hap_session_get_texture)");
+  }
 }
 
 static void note_times(hapi_physics *physics, const double seconds[5], double looked_s)

@@ -50,6 +50,7 @@ typedef struct hapi_said {
   bool swings;
   bool cut;
   bool force_out;
+  bool texture_out;
 } hapi_said;
 
 struct hapi_physics {

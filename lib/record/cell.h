@@ -75,7 +75,8 @@ typedef enum hapi_tick_word {
   HAPI_TICK_MODEL = 2,  /* message taken at its begin */
   HAPI_TICK_PATCHES = 3,
   HAPI_TICK_HASH = 4, /* of all pointers and local bodies after it */
-  HAPI_TICK_BODIES = 5
+  HAPI_TICK_BODIES = 5,
+  HAPI_TICK_TEXTURES = 6 /* a bit for each texture whose function is out */
 } hapi_tick_word;
 
 typedef enum hapi_world_word {

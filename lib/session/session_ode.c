@@ -171,6 +171,7 @@ static hap_status create_parts(hap_session *session, const hap_ode_def *ode, hap
         .trace_rows = (uint32_t)def->expert->trace_rows,
         .guard = def->research->guard,
         .exchange = session->exchange,
+        .textures = session->textures,
     };
     status = hapi_haptic_create(&config, &session->haptic);
   }

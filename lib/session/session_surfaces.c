@@ -12,6 +12,7 @@
 #include "session/session_internal.h"
 
 #define RIGHT_ANGLE 1e-6
+#define CALL_SHARE_MOST 0.5 /* of a haptic period */
 
 static const hap_texture_def texture_defaults = {.cookie = 0x48545831u,
                                                  .pitch = 1e-3,
@@ -53,20 +54,23 @@ static hap_status patch_check(const hap_texture_def *def, hap_detail *detail)
   return HAP_OK;
 }
 
-static hap_status texture_check(const hap_texture_def *def, hap_detail *detail)
+static hap_status texture_check(const hap_texture_def *def, double haptic_hz, hap_detail *detail)
 {
+  const hapi_number_rule rules[] = {HAPI_RULE(def, call_most_s, 0.0, CALL_SHARE_MOST / haptic_hz)};
   if ((def->heights == NULL) == (def->height == NULL)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "a texture has heights or the function height");
   }
   if (!hapi_finite(def->origin, 3)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "origin is not finite");
   }
+  HAPI_TRY(hapi_numbers_check(rules, 1, detail));
   return def->heights != NULL ? patch_check(def, detail) : HAP_OK;
 }
 
 static hap_status texture_fill(const hap_texture_def *def, hapi_texture *out)
 {
-  *out = (hapi_texture){.height = def->height, .arg = def->arg};
+  *out = (hapi_texture){
+      .height = def->height, .arg = def->arg, .most_ns = (int64_t)(1e9 * def->call_most_s)};
   if (def->heights == NULL) {
     return HAP_OK;
   }
@@ -113,9 +117,27 @@ hap_status hap_session_add_texture(hap_session *session, const hap_texture_def *
   }
   *out_texture = 0;
   hap_status status = hapi_def_read(&texture_type, def, &checked, &detail);
-  status = status < HAP_OK ? status : texture_check(&checked, &detail);
+  status = status < HAP_OK ? status : texture_check(&checked, session->def.haptic_hz, &detail);
   if (status < HAP_OK) {
     return hapi_session_note(session, status, &detail);
   }
+  if (!(checked.call_most_s > 0.0)) {
+    checked.call_most_s = HAPI_SAFETY_CALL_SHARE / session->def.haptic_hz;
+  }
   return hapi_session_say(session, texture_put(session->textures, &checked, out_texture), __func__);
+}
+
+hap_status hap_session_get_texture(hap_session *session, uint32_t texture, hap_texture_state *out,
+                                   size_t size_of_out)
+{
+  hap_texture_state state;
+  if (session == NULL) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (hapi_texture_find(session->textures, texture) == NULL) {
+    return hapi_session_say(session, HAP_ERROR_NOT_FOUND, __func__);
+  }
+  hapi_haptic_get_texture(session->haptic, texture, &state);
+  hap_status given = hapi_struct_give(&state, sizeof state, out, size_of_out);
+  return hapi_session_say(session, given < HAP_OK || state.is_out == 0 ? given : HAP_END, __func__);
 }

@@ -46,7 +46,7 @@ const char *hap_event_name(hap_event_kind kind)
       [HAP_EVENT_IMPACT] = "impact",       [HAP_EVENT_BUTTON] = "button",
       [HAP_EVENT_FAULT] = "fault",         [HAP_EVENT_GRIPPER] = "gripper",
       [HAP_EVENT_FORCE_OUT] = "force-out", [HAP_EVENT_HOLD] = "hold",
-      [HAP_EVENT_LET_GO] = "let-go",
+      [HAP_EVENT_LET_GO] = "let-go",       [HAP_EVENT_TEXTURE_OUT] = "texture-out",
   };
   size_t at = (size_t)kind;
   return at < sizeof names / sizeof names[0] ? names[at] : NULL;

@@ -113,6 +113,7 @@ typedef struct hapi_state {
   bool derated;       /* since the start: some tick had less force because ticks came late */
   bool swings;        /* the same because a device swung by itself */
   uint32_t force_out; /* hap_force_out of the call that was taken out last; 0: none was */
+  bool texture_out;   /* since the start the function of some texture was taken out */
   hapi_tick_work work;
   uint32_t unsolved; /* since the start: ticks in a row, at most, that the solver did not solve */
   hap_model model;

@@ -22,6 +22,7 @@ typedef struct hapi_texture {
   double origin[3];   /* m, geom's frame: of the first sample */
   hap_height_fn height;
   void *arg;
+  int64_t most_ns; /* that the calls of a tick may take */
 } hapi_texture;
 
 #define HAPI_TEXTURES 64u

@@ -21,7 +21,7 @@ void hapi_telling_reset(hapi_telling *telling, uint32_t pointers)
 {
   memset(telling->lists, 0, pointers * sizeof *telling->lists);
   memset(telling->events.rows, 0, telling->events.capacity * sizeof *telling->events.rows);
-  telling->faults = 0;
+  telling->faults = telling->textures_out = 0;
   atomic_store(&telling->events.written, 0);
   atomic_store(&telling->events.read, 0);
   atomic_store(&telling->events.dropped, 0);
@@ -344,6 +344,19 @@ static void forces_follow(const listening *at)
   }
 }
 
+static void textures_follow(hapi_telling *telling, const hapi_tick *tick, hapi_event_ring *ring)
+{
+  uint64_t newly = tick->touches.textures.out & ~telling->textures_out;
+  telling->textures_out = tick->touches.textures.out;
+  for (uint32_t i = 0; ring != NULL && newly >> i != 0; ++i) {
+    if ((newly >> i & 1u) != 0) {
+      event_put(ring,
+                &(hap_event){
+                    .kind = HAP_EVENT_TEXTURE_OUT, .number = i + 1, .time_ns = tick->facts.now_ns});
+    }
+  }
+}
+
 static void fault_follow(hapi_telling *telling, const hapi_tick *tick, hapi_event_ring *ring)
 {
   const hapi_fault_latch *latch = &tick->guard.latch;
@@ -460,6 +473,7 @@ void hapi_telling_follow(hapi_telling *telling, const hapi_tick *tick, bool even
       grab_follow(&at);
     }
   }
+  textures_follow(telling, tick, ring);
   fault_follow(telling, tick, ring);
 }
 

@@ -53,6 +53,7 @@ typedef struct hapi_felt_list {
 typedef struct hapi_telling {
   hapi_felt_list *lists; /* by pointer */
   uint64_t faults;       /* that were told, as hapi_fault_latch counts them */
+  uint64_t textures_out; /* likewise, a bit each */
   hapi_event_ring events;
 } hapi_telling;
 

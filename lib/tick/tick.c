@@ -86,6 +86,7 @@ void hapi_tick_reset(hapi_tick *tick)
       .of = tick->bodies.of, .courses = tick->bodies.courses, .live = tick->bodies.live};
   touches->count = touches->pushing = 0;
   touches->feel_count = touches->unsound = 0;
+  touches->textures.out = touches->textures.called = 0;
   touches->rubs = touches->magnets = false;
   touches->contact_ticks = 0;
   memset(touches->hand_impulse, 0, sizeof touches->hand_impulse);

@@ -5,7 +5,8 @@
 
 /* The pure tick: what the haptic thread computes at 1 kHz and more, from the pointers' device poses
  * to the wrenches for the devices. No allocation, lock, system call, log or function pointer in
- * it. All memory is handed over by hapi_tick_reset's caller.
+ * it, but for functions of textures and the clock that times those. All memory is handed over by
+ * hapi_tick_reset's caller.
  *
  *   pointer   device pose -> pointer                               (paper step a)
  *   paper     pointer and planes -> forces -> motion of the neighbours: eq. 7-11

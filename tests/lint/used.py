@@ -25,8 +25,7 @@ def because(reason, names):
 # Function: why no program shows it.
 NO_PROGRAM = {
     **because("the page of its subject has the lines", """
-        hap_session_set_budget hap_session_set_force_error hap_session_surface_changed
-        hap_session_try_lock"""),
+        hap_session_set_budget hap_session_set_force_error"""),
     **because("one call, as its neighbour in the header, which a program shows", """
         hap_pointer_force_remove hap_session_remove_space"""),
     **because("a name for people, or defaults of a struct", """
