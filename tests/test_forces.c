@@ -663,6 +663,51 @@ TEST(magnets_and_detents_are_as_steep_as_the_device_holds)
   steep_check(&magnet, -2000.0 * 0.25e-3 * (1.0 - u * u), "strength 5");
 }
 
+static void scales_set(desk *d, double force_scale, double motion_scale)
+{
+  hap_pointer_settings s;
+  hap_pointer_settings_init(&s, sizeof s);
+  s.mask = HAP_SET_FORCE_SCALE | HAP_SET_MOTION_SCALE;
+  s.force_scale = force_scale;
+  s.motion_scale = motion_scale;
+  REQUIRE(hap_pointer_set(d->session, d->hand, &s) == HAP_OK);
+  REQUIRE(hap_session_advance(d->session, 60) >= HAP_OK);
+}
+
+/* The device stands 0.25 mm from the target and holds 2 kN/m, 1 kN/m of which are asked. The pointer
+ * stays where it is when motion_scale changes. */
+TEST(what_a_device_holds_goes_with_its_scales)
+{
+  const struct {
+    double force_scale;
+    double motion_scale;
+    double stiffness; /* N/m, in the world */
+  } rows[] = {{1.0, 1.0, 1000.0}, {2.0, 1.0, 1000.0}, {8.0, 1.0, 250.0},
+              {1.0, 10.0, 200.0}, {4.0, 4.0, 125.0},  {0.5, 1.0, 1000.0}};
+  hap_detail why = {""};
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  hap_device *device = NULL;
+  REQUIRE(hap_device_open("virtual:path=0:0.00025/0/0;9:0.00025/0/0,rated_stiffness=2000", &device,
+                          &why) >= HAP_OK);
+  d->hand_def.device = device;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  hap_force_def spring = force_of(HAP_FORCE_SPRING);
+  spring.stiffness = 1000.0;
+  hap_force_id id = force_add(d, &spring);
+  session_run(d->session);
+  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+    scales_set(d, rows[i].force_scale, rows[i].motion_scale);
+    hap_pointer_state state = desk_state(d);
+    CHECK_NEAR(state.own.force[0], -rows[i].stiffness * 0.25e-3, EXACT);
+    CHECK(((state.guard & HAP_GUARD_OWN) != 0) == (rows[i].stiffness < 1000.0));
+  }
+  CHECK(hap_pointer_force_set(d->session, d->hand, id, &spring) == HAP_OK); /* of now */
+  hap_session_destroy(d->session);
+  d->session = NULL;
+  hap_device_close(device);
+}
+
 TEST(a_spring_on_a_device_without_figures_is_as_stiff_as_contacts)
 {
   hap_detail why = {""};

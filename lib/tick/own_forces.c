@@ -10,6 +10,8 @@
 #include "local/rows.h"
 #include "pointer/own_force.h"
 
+#define SCALE_ROUNDING 1e-9
+
 /* A force that is added comes in with a share that grows. One that is changed or removed must not
  * leap: the difference between what it gave in the last tick and what it gives now is added, less
  * and less, whatever is changed again meanwhile. So an application may move a spring at each of its
@@ -147,6 +149,23 @@ static double bond_share(const hapi_own_force *own, const hapi_local_body *body,
 
 /* ---- one of them ---- */
 
+/* What the device holds of it in world units goes with force_scale and motion_scale, which may have
+ * changed since it was set. */
+static double scaled_share(const hapi_own_force *own, const hapi_pointer *p)
+{
+  const hapi_pointer_holds *holds = &p->coupling.own;
+  double stiffness = p->coupling.hold_known ? hapi_own_force_stiffness(&own->setup) : 0.0;
+  double damping = hapi_own_force_damping(&own->setup);
+  double share = 1.0;
+  if (stiffness > holds->stiffness * (1.0 + SCALE_ROUNDING)) {
+    share = holds->stiffness / stiffness;
+  }
+  if (damping > holds->damping * (1.0 + SCALE_ROUNDING)) {
+    share = hapi_min(share, holds->damping / damping);
+  }
+  return share;
+}
+
 /* What the setup comes to, without what a change has left. True: a call gave more than is
  * promised, or a body could not hold it. */
 static bool own_value(hapi_own_force *own, const hapi_pointer *p, const hapi_local_body *body,
@@ -169,9 +188,10 @@ static bool own_value(hapi_own_force *own, const hapi_pointer *p, const hapi_loc
   hapi_v3_scale(own->share, out->torque, out->torque);
   bool force = hapi_v3_shorten(out->force, setup->max_force);
   bool torque = hapi_v3_shorten(out->torque, setup->max_torque);
-  double holds = body != NULL && facts->model == HAP_MODEL_CONTACT
-                     ? bond_share(own, body, p, out, facts->period)
-                     : 1.0;
+  double holds = scaled_share(own, p);
+  if (body != NULL && facts->model == HAP_MODEL_CONTACT) {
+    holds = hapi_min(holds, bond_share(own, body, p, out, facts->period));
+  }
   if (holds < 1.0) {
     hapi_v3_scale(holds, out->force, out->force);
     hapi_v3_scale(holds, out->torque, out->torque);
