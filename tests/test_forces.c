@@ -7,6 +7,7 @@
 
 #include <math.h>
 
+#include <hapode/expert.h>
 #include <hapode/forces.h>
 
 #include "tests/desk.h"
@@ -674,8 +675,8 @@ static void scales_set(desk *d, double force_scale, double motion_scale)
   REQUIRE(hap_session_advance(d->session, 60) >= HAP_OK);
 }
 
-/* The device stands 0.25 mm from the target and holds 2 kN/m, 1 kN/m of which are asked. The pointer
- * stays where it is when motion_scale changes. */
+/* The device stands 0.25 mm from the target and holds 2 kN/m, 1 kN/m of which are asked. The
+ * pointer stays where it is when motion_scale changes. */
 TEST(what_a_device_holds_goes_with_its_scales)
 {
   const struct {
@@ -706,6 +707,64 @@ TEST(what_a_device_holds_goes_with_its_scales)
   hap_session_destroy(d->session);
   d->session = NULL;
   hap_device_close(device);
+}
+
+typedef struct both_row {
+  const char *hand;
+  double delay;     /* s, of the device */
+  double stiffness; /* N/m, that the device holds: 0.8 of 2 N s/m over half a tick and the delay */
+} both_row;
+
+/* A contact and a spring, each as stiff as the device holds, and a blow. */
+static void both_check(const both_row *row)
+{
+  char spec[256];
+  hap_detail why = {""};
+  hap_force_id id = {0};
+  hap_pointer_expert_def expert;
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  floor_add(d);
+  snprintf(spec, sizeof spec,
+           "virtual:path=0:0/0/0.02;0.5:0/0/0.0065;9:0/0/0.0065,hand=%s,device_mass=0.1,"
+           "device_damping=2,delay=%g,kick=1:0/0/0.1",
+           row->hand, row->delay);
+  REQUIRE(hap_device_open(spec, &d->hand_def.device, &why) >= HAP_OK);
+  hap_pointer_expert_def_init(&expert, sizeof expert);
+  expert.coupling = HAP_COUPLING_DIRECT;
+  d->hand_def.expert = &expert;
+  d->hand_def.stiffness = row->stiffness;
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  hap_force_def spring = force_of(HAP_FORCE_SPRING);
+  spring.target = HAP_FORCE_PLANE;
+  spring.origin[2] = 0.007;
+  spring.stiffness = 0.999 * row->stiffness;
+  CHECK(hap_pointer_force_add(d->session, d->hand, &spring, &id) == HAP_OK);
+  session_run(d->session);
+  REQUIRE(hap_session_advance(d->session, 6000) >= HAP_OK);
+  hap_pointer_state state = desk_state(d);
+  double first = state.wrench.force[2];
+  CHECK(state.contacts == 1 && fabs(state.own.force[2]) > 0.1);
+  for (int i = 0; i < 200; ++i) {
+    REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
+    CHECK_NEAR(desk_state(d).wrench.force[2], first, 1e-3);
+  }
+  CHECK(session_stats(d->session).faults.count == 0);
+  hap_session_destroy(d->session);
+  d->session = NULL;
+  hap_device_close(d->hand_def.device);
+}
+
+/* A hand brings the damping that twice the stiffness needs (docs/forces.md). */
+TEST(a_hand_holds_a_contact_and_a_spring_that_the_device_holds_each)
+{
+  static const both_row rows[] = {{"relaxed", 0.0, 3200.0},
+                                  {"tense", 0.0, 3200.0},
+                                  {"relaxed", 1e-3, 1066.0},
+                                  {"tense", 1e-3, 1066.0}};
+  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+    both_check(&rows[i]);
+  }
 }
 
 TEST(a_spring_on_a_device_without_figures_is_as_stiff_as_contacts)
