@@ -170,6 +170,32 @@ TEST(what_sticks_behind_a_proxy_rubs)
 
 /* ---- bodies ---- */
 
+/* Springs that are worked out before the solve: drawn back by 0.7 N a tick, none is above the
+ * limit, and friction goes by the whole load. */
+TEST(an_explicit_spring_sticks)
+{
+  contact_world *w = floor_new(HAP_MODEL_CONTACT);
+  cw_add_box(w, 1e9, AT(0.2, 0.2, 0.2), 0.0, 0.0, -0.1); /* that does not give way */
+  told.says.adhesion = ADHESION;
+  told.says.friction_static = told.says.friction_dynamic = 0.5;
+  w->hand_research.integration = HAP_INTEGRATION_EXPLICIT;
+  floor_start(w);
+  hand_press(w, 0.001);
+  hand_press(w, -0.0006);
+  CHECK_NEAR(w->force[2], -0.6, 1e-4);
+  cw_go(w, 0.02, 0.0, 0.0, 400);
+  CHECK_NEAR(w->force[0], -0.5 * (ADHESION - 0.6), 1e-3);
+  hand_press(w, 0.001);
+  double most = 0.0;
+  cw_move_hand(w, 0.0, 0.0, 0.7);
+  for (int i = 0; i < 10; ++i) {
+    cw_tick(w);
+    most = fmax(most, -w->force[2]);
+  }
+  CHECK_NEAR(most, ADHESION, 1e-6);
+  CHECK(w->force[2] == 0.0);
+}
+
 /* A hand that sticks to a ball in free space: what it gets the ball gives. */
 TEST(the_body_gets_what_the_hand_feels)
 {
