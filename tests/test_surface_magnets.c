@@ -138,6 +138,69 @@ TEST(a_body_that_sleeps_wakes)
   }
 }
 
+/* Beside its middle a box is turned by what the hand feels, as it is at the hand. */
+TEST(a_box_is_turned_by_the_arm)
+{
+  contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+  dMass mass;
+  double turned[3] = {0.0, 0.0, 0.0}; /* N m s */
+  double synced[3] = {0.0, 0.0, 0.0}; /* up to the newest sync */
+  dBodyID box = cw_add_box(w, 5.0, AT(0.1, 0.1, 0.1), 0.0, 0.0, -0.05);
+  cw_start(w, 0.03, 0.02, RADIUS + 0.008);
+  for (int i = 0; i < 100; ++i) {
+    double arm[3];
+    uint32_t steps = w->seen.steps;
+    cw_tick(w);
+    if (w->seen.steps != steps) {
+      memcpy(synced, turned, sizeof synced);
+    }
+    for (int k = 0; k < 3; ++k) {
+      arm[k] = w->hand_at[k] - w->position[0][k];
+    }
+    turned[0] -= PERIOD * (arm[1] * w->force[2] - arm[2] * w->force[1]);
+    turned[1] -= PERIOD * (arm[2] * w->force[0] - arm[0] * w->force[2]);
+    turned[2] -= PERIOD * (arm[0] * w->force[1] - arm[1] * w->force[0]);
+  }
+  dBodyGetMass(box, &mass);
+  const dReal *spin = dBodyGetAngularVel(box);
+  CHECK(synced[0] > 1e-3 && synced[1] < -1e-3);
+  for (int k = 0; k < 3; ++k) {
+    CHECK_NEAR(mass.I[0] * spin[k], synced[k], 2e-3 * synced[0]);
+  }
+}
+
+/* What a ball of 1 g can hold of 20 N on 3 mm: a change of 0.3 of its way in a tick. It comes at
+ * once, as the hand was out of reach. */
+TEST(a_light_body_bounds_the_pull)
+{
+  const double mass = 0.001;
+  const double reach = 0.003;
+  const double steep = PEAK * 20.0 / reach * PERIOD * PERIOD / mass;
+  const double u = 0.002 / reach;
+  contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+  told.says.magnet_force = 20.0;
+  told.says.magnet_reach = reach;
+  cw_add_ball(w, mass, 0.03, 0.0, 0.0, -0.03);
+  cw_start(w, 0.0, 0.0, RADIUS + 0.0035);
+  cw_run(w, 50);
+  CHECK(w->force[2] == 0.0);
+  cw_go(w, 0.0, 0.0, -1.5, 1);
+  CHECK_NEAR(w->force[2], -20.0 * PEAK * u * (1.0 - u * u) * 0.3 / steep, 1e-6);
+}
+
+/* Their bodies do not move in the loop, so nothing pulls at them. */
+TEST(bodies_of_the_papers_models_are_not_pulled)
+{
+  static const hap_model models[] = {HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE};
+  for (int i = 0; i < 2; ++i) {
+    contact_world *w = magnet_floor(models[i]);
+    cw_add_ball(w, 0.2, 0.03, 0.0, 0.0, -0.03);
+    cw_start(w, 0.0, 0.0, RADIUS + 0.008);
+    cw_run(w, 60);
+    CHECK(cw_norm(w->force) == 0.0 && cw_norm(w->seen.momentum) == 0.0);
+  }
+}
+
 /* 1 g of it cannot swing faster than the tick. */
 TEST(light_bodies_stay_bounded)
 {
