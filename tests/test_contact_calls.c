@@ -341,9 +341,17 @@ static void belt_plain(double *force)
   plain_end(&p);
 }
 
+/* A direction may have any length. */
+static bool belt_runs_long(void *user, hap_contact *io)
+{
+  (void)belt_runs(user, io);
+  io->direction[0] *= 3.0;
+  return true;
+}
+
 static void belt_felt(double physics_hz, double *force)
 {
-  desk *d = calls_desk(HAP_MODEL_CONTACT, physics_hz, belt_runs);
+  desk *d = calls_desk(HAP_MODEL_CONTACT, physics_hz, belt_runs_long);
   (void)belt_build(d->world, d->space);
   d->hand_def.collide_bits = 1;
   belt_hand(0, &d->at[0], &d->velocity[0]);
@@ -595,6 +603,159 @@ TEST(velocities_are_those_of_the_world_in_slow_motion)
   desk_wait(d, 80);
   CHECK(atomic_load(&book.in_loop) > 0);
   CHECK(atomic_load(&book.bad) == 0);
+}
+
+/* ---- two bodies that move and turn ---- */
+
+#define DISC_X 0.02
+#define DISC_Y 0.01
+#define DISC_RADIUS 0.05
+#define DISC_SPIN 3.0   /* rad/s, about z */
+#define DISC_FALLS 0.02 /* m/s */
+#define PLATE_SPEED 0.1 /* m/s, along x */
+
+/* The plate's upper side is at 0, and nothing holds the disc. */
+static bool moving_note(void *user, hap_contact *io)
+{
+  told_book *book = user;
+  double sign = io->data_a == &body_tag ? 1.0 : -1.0;
+  double x = io->point[0] - DISC_X;
+  double y = io->point[1] - DISC_Y;
+  bool good = fabs(sign * io->velocity[0] - (-DISC_SPIN * y - PLATE_SPEED)) < 1e-6 &&
+              fabs(sign * io->velocity[1] - DISC_SPIN * x) < 1e-6 &&
+              fabs(sign * io->velocity[2] + DISC_FALLS) < 1e-6;
+  if (io->in_loop != 0) { /* half way between the sides, on the disc's rim */
+    good = good && fabs(io->point[2] + 0.5 * io->depth) < 1e-9 &&
+           fabs(sqrt(x * x + y * y) - DISC_RADIUS) < 1e-6;
+  }
+  atomic_fetch_add(io->in_loop != 0 ? &book->in_loop : &book->in_step, 1);
+  atomic_fetch_add(&book->bad, !good);
+  return false;
+}
+
+static void moving_build(desk *d)
+{
+  dMass mass;
+  dBodyID plate = ode_box(d->world, d->space, 5.0, AT(1.0, 1.0, 0.1), AT(0.0, 0.0, -0.05));
+  dBodySetLinearVel(plate, PLATE_SPEED, 0.0, 0.0);
+  dGeomSetData(dBodyGetFirstGeom(plate), &platform_tag);
+  dGeomID disc = dCreateCylinder(d->space, DISC_RADIUS, 0.1);
+  dMassSetCylinderTotal(&mass, LOAD, 3, DISC_RADIUS, 0.1);
+  dBodyID body = ode_body(d->world, disc, &mass, AT(DISC_X, DISC_Y, 0.05 + 0.003));
+  dBodySetLinearVel(body, 0.0, 0.0, -DISC_FALLS);
+  dBodySetAngularVel(body, 0.0, 0.0, DISC_SPIN);
+  dGeomSetData(disc, &body_tag);
+}
+
+TEST(velocities_are_those_of_both_at_the_point)
+{
+  for (int near = 0; near < 2; ++near) {
+    told_book book = {0};
+    desk *d = calls_desk(HAP_MODEL_CONTACT, 60.0, moving_note);
+    d->ode.user = &book;
+    dWorldSetGravity(d->world, 0.0, 0.0, 0.0);
+    moving_build(d);
+    desk_run(d, near == 0 ? 5.0 : DISC_X + DISC_RADIUS + RADIUS + 0.003, DISC_Y, 0.05);
+    desk_wait(d, 400);
+    CHECK(atomic_load(near == 0 ? &book.in_step : &book.in_loop) > 20);
+    CHECK(atomic_load(&book.bad) == 0);
+    tap_release(d);
+  }
+}
+
+/* ---- directions ---- */
+
+static bool direction_say(void *user, dGeomID a, dGeomID b, double out[3])
+{
+  (void)user;
+  (void)a;
+  (void)b;
+  memcpy(out, AT(3.0, 4.0, 0.0), 3 * sizeof *out);
+  return true;
+}
+
+static bool direction_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  (void)half_friction(user, a, b, io);
+  io->mode |= dContactFDir1;
+  return true;
+}
+
+static bool direction_note(void *user, hap_contact *io)
+{
+  told_book *book = user;
+  bool good = (io->surface.mode & dContactFDir1) != 0 && fabs(io->direction[0] - 0.6) < 1e-9 &&
+              fabs(io->direction[1] - 0.8) < 1e-9 && fabs(io->direction[2]) < 1e-9;
+  atomic_fetch_add(io->in_loop != 0 ? &book->in_loop : &book->in_step, 1);
+  atomic_fetch_add(&book->bad, !good);
+  return true;
+}
+
+TEST(the_direction_of_the_pair_is_told)
+{
+  for (int near = 0; near < 2; ++near) {
+    told_book book = {0};
+    desk *d = calls_desk(HAP_MODEL_CONTACT, 60.0, direction_note);
+    d->ode.user = &book;
+    d->ode.surface = direction_surface;
+    d->ode.friction_direction = direction_say;
+    (void)push_build(d->world, d->space);
+    desk_run(d, near == 0 ? 5.0 : -0.05 - RADIUS - 0.003, 0.0, 0.05);
+    desk_wait(d, 100);
+    CHECK(atomic_load(near == 0 ? &book.in_step : &book.in_loop) > 0);
+    CHECK(atomic_load(&book.bad) == 0);
+    tap_release(d);
+  }
+}
+
+/* ---- surfaces of single contacts ---- */
+
+static bool half_ice(void *user, hap_contact *io)
+{
+  (void)user;
+  io->surface.mu = io->point[1] < 0.0 ? 0.4 : 0.0;
+  return true;
+}
+
+/* The half that is pushed rubs, and has less load as the push is above the floor. */
+TEST(two_surfaces_under_one_box)
+{
+  const double height = 0.02;
+  desk *d = calls_desk(HAP_MODEL_CONTACT, 60.0, half_ice);
+  (void)push_build(d->world, d->space);
+  desk_run(d, 0.0, -0.05 - RADIUS - 0.001, height - LAYER);
+  const double right = 0.4 * 0.5 * LOAD * G / (1.0 + 0.4 * height / 0.1);
+  double felt = 0.0;
+  desk_move(d, 0.0, 0.024, 0.0, 600); /* what swings at first dies down */
+  for (int i = 0; i < 400; ++i) {
+    desk_move(d, 0.0, 4e-5, 0.0, 1);
+    felt -= desk_state(d).wrench.force[1] / 400.0;
+  }
+  printf("# %.4f N of %.4f\n", felt, right);
+  CHECK_NEAR(felt, right, 0.01 * right);
+}
+
+/* The time of the world passes slower, and so does the belt. */
+TEST(a_belt_in_slow_motion)
+{
+  desk *d = calls_desk(HAP_MODEL_CONTACT, 60.0, belt_runs);
+  hap_pose poses[2];
+  hap_body_role role = HAP_ROLE_WORLD;
+  dBodyID box = belt_build(d->world, d->space);
+  d->session = session_make(&d->def, &d->ode);
+  REQUIRE(hap_session_set_time_scale(d->session, 0.25) == HAP_OK);
+  REQUIRE(hap_pointer_add(d->session, &d->hand_def, &d->hand) == HAP_OK);
+  d->at[0] = -0.25;
+  d->at[2] = 0.02 + RADIUS + 0.003;
+  hand_lead(d);
+  session_run(d->session);
+  desk_move(d, 0.05, 0.0, 0.0, 700);
+  REQUIRE(hap_session_poses_now(d->session, &box, 1, &poses[0]) >= HAP_OK);
+  desk_move(d, 0.0075, 0.0, 0.0, 100);
+  REQUIRE(hap_session_poses_now(d->session, &box, 1, &poses[1]) >= HAP_OK);
+  REQUIRE(hap_session_roles(d->session, &box, 1, &role) >= HAP_OK);
+  CHECK(role == HAP_ROLE_LOOP || role == HAP_ROLE_RESTING);
+  CHECK_NEAR(poses[1].position[0] - poses[0].position[0], 0.25 * BELT_SPEED * 0.1, 1e-4);
 }
 
 /* ---- wrong callbacks ---- */
