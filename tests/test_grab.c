@@ -703,6 +703,43 @@ TEST(a_kinematic_body_is_a_handle)
   }
 }
 
+/* A handle that is driven goes ahead of the hand: what it gives in each round is its drive's work,
+ * and no energy out of nothing. */
+TEST(what_a_driven_handle_gives_is_felt)
+{
+  const double w = 2.0 * M_PI; /* 1/s */
+  const double far = 0.01;
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID body = box_add(d, 1.0);
+  dBodySetKinematic(body);
+  d->hand_def.max_force = 20.0;
+  desk_run(d, 0.0, 0.0, 0.5);
+  desk_hold(d, body, NULL);
+  desk_wait(d, 50);
+  double work = 0.0;
+  double worst = 0.0;
+  for (int k = 1; k <= 2000; ++k) {
+    double t = T * k;
+    if (k % 10 == 1) { /* the twist that holds until the next step */
+      REQUIRE(hap_session_lock(d->session) == HAP_OK);
+      dBodySetLinearVel(body, far * w * cos(w * t), 0.0, 0.0);
+      hap_session_unlock(d->session);
+    }
+    d->at[0] = far * (sin(w * t - 1.0) + sin(1.0));
+    d->velocity[0] = far * w * cos(w * t - 1.0);
+    hand_lead(d);
+    REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
+    double force = desk_state(d).wrench.force[0];
+    work += T * force * d->velocity[0];
+    double right = 1000.0 * (pose_of(d, body).position[0] - d->at[0]);
+    worst = k > 100 ? fmax(worst, fabs(force - right)) : 0.0; /* the hand begins at full speed */
+  }
+  printf("# %.3g J, %.3g N off\n", work, worst);
+  CHECK_NEAR(work, 2.0 * 1000.0 * M_PI * far * far * sin(1.0), 0.05); /* two rounds */
+  CHECK(worst < 0.5);
+  CHECK(session_stats(d->session).faults.fault == HAP_FAULT_NONE);
+}
+
 /* ---- ticks that are missed ---- */
 
 typedef struct gap_row {
