@@ -292,6 +292,11 @@ TEST(a_false_value_is_not_taken_over)
     bench_run(b, 1);
   }
   CHECK(hand_state(b).axes[0] == HIGH && bench_fault(b) == HAP_FAULT_NONE);
+  bench_run(b, 20);
+  CHECK((hand_state(b).guard & HAP_GUARD_INPUT) == 0);
+  b->grip.at[0] = HIGH + 0.06 * RANGE; /* more than a little is false */
+  bench_run(b, 1);
+  CHECK((hand_state(b).guard & HAP_GUARD_INPUT) != 0);
 }
 
 /* A value that stays at another place is believed after 3 ms; noise takes the force and is a
