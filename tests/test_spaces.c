@@ -259,17 +259,27 @@ TEST(spaces_come_and_go_while_it_runs)
 TEST(bodies_of_a_space_that_is_removed_are_forgotten)
 {
   static const layout movers = {"", {0, 0, 1, 1}, {BOTH}};
-  yard *y = yard_new(&movers, HAP_MODEL_CONTACT);
-  desk *d = y->d;
-  hap_pose pose;
-  yard_run(y, &movers, -0.5 * EDGE - RADIUS + 0.001, 0.0, 0.05);
-  desk_wait(d, 100);
-  CHECK(hap_session_poses(d->session, 0, y->boxes, 1, &pose) >= HAP_OK);
-  CHECK(hap_session_remove_space(d->session, y->spaces[1]) == HAP_OK);
-  CHECK(hap_session_poses(d->session, 0, y->boxes, 1, &pose) == HAP_ERROR_NOT_FOUND);
-  desk_wait(d, 100);
-  CHECK(session_stats(d->session).faults.bodies_lost == 0);
-  CHECK(yard_state(y).wrench.force[0] == 0.0);
+  for (int nested = 0; nested < 2; ++nested) {
+    yard *y = yard_new(&movers, HAP_MODEL_CONTACT);
+    desk *d = y->d;
+    hap_pose pose;
+    dSpaceID inner = dSimpleSpaceCreate(y->spaces[1]);
+    if (nested != 0) { /* in a space inside of it */
+      dGeomID geom = dBodyGetFirstGeom(y->boxes[0]);
+      dSpaceRemove(y->spaces[1], geom);
+      dSpaceAdd(inner, geom);
+    }
+    yard_run(y, &movers, -0.5 * EDGE - RADIUS + 0.001, 0.0, 0.05);
+    desk_wait(d, 100);
+    CHECK(hap_session_poses(d->session, 0, y->boxes, 1, &pose) >= HAP_OK);
+    CHECK(hap_session_remove_space(d->session, y->spaces[1]) == HAP_OK);
+    CHECK(hap_session_poses(d->session, 0, y->boxes, 1, &pose) == HAP_ERROR_NOT_FOUND);
+    desk_wait(d, 100);
+    CHECK(session_stats(d->session).faults.bodies_lost == 0);
+    CHECK(yard_state(y).wrench.force[0] == 0.0);
+    tap_release(y);
+    tap_release(d);
+  }
 }
 
 typedef struct loss {
