@@ -159,9 +159,11 @@ void hapi_pointers_follow(hapi_haptic *haptic)
   for (uint32_t i = 0; i < haptic->config.capacity.pointers; ++i) {
     hapi_pointer_slot *slot = &haptic->slots[i];
     int phase = atomic_load_explicit(&slot->phase, memory_order_acquire);
-    /* A pointer that the application moves comes in with its first target. */
-    bool ready = slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer);
-    if (phase == HAPI_POINTER_ADDED && ready) {
+    /* A pointer that the application moves comes in with its first target. Before it is added the
+     * application may be filling the slot. */
+    bool ready = phase == HAPI_POINTER_ADDED &&
+                 (slot->ops != NULL || hapi_triple_is_fresh(&slot->target_buffer));
+    if (ready) {
       hapi_settings_swap(slot);
       pointer_activate(haptic, i);
       if (slot->ops != NULL) {
