@@ -33,6 +33,9 @@ import time
 
 GUARD_TESTS = ["guard", "guard_session", "faults", "late", "false_input", "oscillation", "declared",
                "session_devices", "pointer_set", "safety_numbers"]
+GRIP_TESTS = ["grab", "adhesion"]
+FEEL_TESTS = ["axes", "surfaces", "effects", "forces", "bound_forces", "force_calls",
+              "surface_magnets", "impact", "forces_stable"]
 WATCH_TESTS = ["emergency", "watchdog", "guard_session", "module", "faults_threads"]
 SPIDAR_TESTS = ["spidar_device", "spidar_errors", "spidar_frames", "spidar_emulator", "spidar",
                 "false_input", "spidar_the"]
@@ -44,10 +47,10 @@ AREAS = [
     ("lib/device/emergency.c", WATCH_TESTS),
     ("lib/device/watchdog.c", WATCH_TESTS),
     ("lib/haptic/standstill.c", WATCH_TESTS),
-    ("lib/guard/*.c", GUARD_TESTS),
+    ("lib/guard/*.c", GUARD_TESTS + GRIP_TESTS),
     ("lib/pointer/plausible.c", ["safety_numbers", "false_input", "faults", "late"]),
-    ("lib/base/safety.h", GUARD_TESTS + WATCH_TESTS + SPIDAR_TESTS + CONTACT_TESTS +
-     ["spidar_guard"]),
+    ("lib/base/safety.h", GUARD_TESTS + GRIP_TESTS + FEEL_TESTS + WATCH_TESTS +
+     SPIDAR_TESTS + CONTACT_TESTS + ["spidar_guard"]),
     ("plugins/spidar/guard.c", ["spidar_guard", "spidar"]),
     ("plugins/spidar/belief.c", ["spidar_device", "safety_numbers", "false_input",
                                  "spidar_emulator"]),
