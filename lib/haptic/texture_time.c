@@ -57,7 +57,7 @@ void hapi_texture_time_judge(hapi_haptic *haptic)
 {
   uint64_t called = haptic->tick.touches.textures.called;
   haptic->tick.touches.textures.called = 0;
-  for (uint32_t i = 0; called >> i != 0; ++i) {
+  for (uint32_t i = 0; i < HAPI_TEXTURES && called >> i != 0; ++i) {
     if ((called >> i & 1u) != 0) {
       texture_judge(haptic, i);
     }
