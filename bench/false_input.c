@@ -23,8 +23,6 @@
 #define FACE 0.025  /* m, x of what it is pressed against */
 #define EDGE 0.04   /* m, of the cubes */
 #define CUBES 5
-#define SPIKE_COUNTS 300
-#define SPIKE 0.004     /* m */
 #define DRIFT 0.1       /* m/s, of a string */
 #define DRIFT_AXIS 0.02 /* m/s */
 #define OLD_S 0.05
@@ -61,7 +59,7 @@ typedef struct stage {
 
 void false_input_init(false_input_def *def)
 {
-  *def = (false_input_def){.stiffness = 1000.0, .seed = 1, .haptic_hz = 1000.0};
+  *def = (false_input_def){.stiffness = 1000.0, .spike = 0.004, .seed = 1, .haptic_hz = 1000.0};
 }
 
 const char *false_input_name(false_input_kind kind)
@@ -186,6 +184,7 @@ static void spidar_spoil(driven_spidar *d, double time, void *user)
   stage *s = user;
   double since = false_time(time);
   double metres = fabs(d->device.model.metres_per_count[STRING]);
+  double spike = s->def->spike / metres;
   for (int i = 0; i < d->emulator.wire.count; ++i) {
     memcpy(s->counts[s->reads % OLD_MAX][i], d->emulator.wire.boards[i].counts,
            sizeof s->counts[0][0]);
@@ -197,20 +196,20 @@ static void spidar_spoil(driven_spidar *d, double time, void *user)
     case FALSE_ONE_SPIKES:
     case FALSE_ALWAYS:
       if (is_spiked(s, since)) {
-        tell_off(d, STRING, dice_sign(s) * SPIKE_COUNTS);
+        tell_off(d, STRING, dice_sign(s) * spike);
       }
       break;
     case FALSE_ALL_SPIKES:
     case FALSE_ALL_ALWAYS:
       if (is_spiked(s, since)) {
         for (int i = 0; i < 8; ++i) {
-          tell_off(d, i, dice_sign(s) * SPIKE_COUNTS);
+          tell_off(d, i, dice_sign(s) * spike);
         }
       }
       break;
     case FALSE_SINGLE:
       if (s->def->kind == FALSE_SINGLE && single > 0) {
-        tell_off(d, single == 2 ? -1 : STRING, single == 3 ? 5000.0 : SPIKE_COUNTS);
+        tell_off(d, single == 2 ? -1 : STRING, single == 3 ? 5000.0 : spike);
       }
       break;
     case FALSE_ONE_DRIFTS:
@@ -282,18 +281,18 @@ static void pose_spoil(stage *s, double since, hap_pose *io, hap_twist *twist)
   switch (s->def->kind) {
     case FALSE_ONE_SPIKES:
     case FALSE_ALWAYS:
-      io->position[0] += is_spiked(s, since) ? dice_sign(s) * SPIKE : 0.0;
+      io->position[0] += is_spiked(s, since) ? dice_sign(s) * s->def->spike : 0.0;
       break;
     case FALSE_ALL_SPIKES:
     case FALSE_ALL_ALWAYS:
       if (is_spiked(s, since)) {
         for (int k = 0; k < 3; ++k) {
-          io->position[k] += dice_sign(s) * SPIKE;
+          io->position[k] += dice_sign(s) * s->def->spike;
         }
       }
       break;
     case FALSE_SINGLE:
-      io->position[0] += single == 1 ? SPIKE : single == 2 ? -0.5 * SPIKE : 0.0;
+      io->position[0] += single == 1 ? s->def->spike : single == 2 ? -0.5 * s->def->spike : 0.0;
       io->position[0] += single == 3 ? 0.15 : 0.0;
       break;
     case FALSE_ONE_DRIFTS:

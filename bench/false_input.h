@@ -21,15 +21,15 @@
 
 typedef enum false_input_kind {
   FALSE_NOTHING = 0,
-  FALSE_ONE_SPIKES,  /* one string +-300 counts in 5 % of the replies; virtual: 4 mm */
+  FALSE_ONE_SPIKES,  /* one string +- a spike in 5 % of the replies; virtual: one axis */
   FALSE_ALL_SPIKES,  /* all strings, each for itself; virtual: each axis */
-  FALSE_SINGLE,      /* three replies alone, one string by 300 counts, all by 300, one by 5000 */
+  FALSE_SINGLE,      /* three replies alone, one string by a spike, once by 5000 counts */
   FALSE_ONE_STUCK,   /* one string; virtual: the whole pose */
   FALSE_ONE_DRIFTS,  /* one string by 0.1 m/s; virtual: one axis by 0.02 m/s */
   FALSE_BOARD_STUCK, /* one board repeats its positions; virtual: one axis */
   FALSE_ALL_STUCK,   /* all boards */
   FALSE_OLD,         /* positions of 50 ms ago in 10 % of the replies */
-  FALSE_ALWAYS,      /* one string +-300 counts in every reply; virtual: 4 mm */
+  FALSE_ALWAYS,      /* one string +- a spike in every reply; virtual: one axis */
   FALSE_ALL_ALWAYS,  /* all strings */
   FALSE_KINDS
 } false_input_kind;
@@ -46,6 +46,7 @@ typedef struct false_input_def {
   false_input_kind kind;
   bool row;         /* cubes in place of the wall */
   double stiffness; /* N/m, of the contact */
+  double spike;     /* m, of one string, or along an axis of the virtual device */
   uint32_t seed;
   double haptic_hz;
 } false_input_def;

@@ -12,12 +12,21 @@
 #define PEAK_MOST 1.1 /* of what is right */
 #define STEP_MOST 2.0 /* N in 2 ms, beyond the undisturbed one */
 
+#define SEEDS 5
+
 typedef struct runs {
   false_input_run right;
   false_input_run run;
 } runs;
 
-static hap_status case_measure(bench *b, FILE *csv, const false_input_def *def, runs *r)
+static bool is_random(int kind)
+{
+  return kind == FALSE_ONE_SPIKES || kind == FALSE_ALL_SPIKES || kind == FALSE_OLD ||
+         kind == FALSE_ALWAYS || kind == FALSE_ALL_ALWAYS;
+}
+
+static hap_status case_measure(bench *b, FILE *csv, const false_input_def *def, runs *r,
+                               bool *out_good)
 {
   false_input_figures f;
   hap_status status = false_input_measure(def, &r->run, &b->detail);
@@ -27,20 +36,46 @@ static hap_status case_measure(bench *b, FILE *csv, const false_input_def *def, 
   false_input_compare(def, &r->right, &r->run, &f);
   const char *device = false_input_device_name(def->device);
   const char *name = false_input_name(def->kind);
-  bool good =
+  *out_good =
       f.share <= PEAK_MOST && f.step <= STEP_MOST + f.step_right && false_input_is_told(&r->run);
-  fprintf(csv, "%s,%s,%s,%g,%g,%.4g,%.4g,%.4g,%.4g,%u,%.4g,%.4g,%.4g,%.4g\n", device,
+  fprintf(csv, "%s,%s,%s,%g,%g,%.4g,%.4g,%.4g,%.4g,%u,%.4g,%.4g,%.4g,%.4g,%g,%u\n", device,
           def->row ? "row" : "wall", name, def->stiffness, def->haptic_hz, f.peak, f.peak_right,
-          f.step, f.step_right, r->run.fault, r->run.fault_s, r->run.told_s, r->run.seen_s,
-          f.share);
-  bench_check(b, good,
-              "%s, %s, %g N/m, %g Hz, %s: %.2f N (undisturbed %.2f), %.2f of what is right, in 2 "
-              "ms %.2f N (%.2f), "
+          f.step, f.step_right, r->run.fault, r->run.fault_s, r->run.told_s, r->run.seen_s, f.share,
+          def->spike, def->seed);
+  if (*out_good && def->seed != 1) {
+    return HAP_OK; /* the first one stands for those that are good */
+  }
+  bench_check(b, *out_good,
+              "%s, %s, %g N/m, %g Hz, %s, %g mm, seed %u: %.2f N (undisturbed %.2f), %.2f of what "
+              "is right, in 2 ms %.2f N (%.2f), "
               "fault %u after %.0f ms, to be seen after %.0f ms, told after %.0f ms %s",
-              device, def->row ? "row" : "wall", def->stiffness, def->haptic_hz, name, f.peak,
-              f.peak_right, f.share, f.step, f.step_right, r->run.fault, 1e3 * r->run.fault_s,
-              1e3 * r->run.seen_s, 1e3 * r->run.told_s, r->run.text);
+              device, def->row ? "row" : "wall", def->stiffness, def->haptic_hz, name,
+              1e3 * def->spike, def->seed, f.peak, f.peak_right, f.share, f.step, f.step_right,
+              r->run.fault, 1e3 * r->run.fault_s, 1e3 * r->run.seen_s, 1e3 * r->run.told_s,
+              r->run.text);
   return HAP_OK;
+}
+
+/* One kind of fault, as often as chance or the size of a spike makes it another one. */
+static hap_status kind_measure(bench *b, FILE *csv, false_input_def *def, runs *r)
+{
+  static const double spikes[] = {0.004, 0.001, 0.002, 0.011};
+  hap_status status = HAP_OK;
+  for (int size = 0; size < (def->kind == FALSE_ONE_SPIKES && !b->quick ? 4 : 1); ++size) {
+    int seeds = is_random(def->kind) && !b->quick ? SEEDS : 1;
+    int good = 0;
+    for (int seed = 1; seed <= seeds && status >= HAP_OK; ++seed) {
+      bool is_good = false;
+      def->spike = spikes[size];
+      def->seed = (uint32_t)seed;
+      status = case_measure(b, csv, def, r, &is_good);
+      good += is_good;
+    }
+    if (seeds > 1) {
+      bench_say("     %d of %d seeds are good", good, seeds);
+    }
+  }
+  return status;
 }
 
 hap_status bench_input(bench *b)
@@ -51,7 +86,8 @@ hap_status bench_input(bench *b)
   FILE *csv =
       bench_csv_open(b, "input",
                      "device,world,fault,stiffness_n_per_m,haptic_hz,peak_n,"
-                     "peak_right_n,step_2ms_n,step_right_n,latched,fault_s,told_s,seen_s,share");
+                     "peak_right_n,step_2ms_n,step_right_n,latched,fault_s,told_s,seen_s,share,"
+                     "spike_m,seed");
   if (r == NULL || csv == NULL) {
     free(r);
     return bench_csv_close(b, csv, r == NULL ? HAP_ERROR_MEMORY : HAP_ERROR_IO);
@@ -74,7 +110,7 @@ hap_status bench_input(bench *b)
             continue;
           }
           def.kind = (false_input_kind)kind;
-          status = case_measure(b, csv, &def, r);
+          status = kind_measure(b, csv, &def, r);
         }
       }
     }

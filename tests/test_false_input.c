@@ -408,9 +408,9 @@ TEST(a_device_that_does_not_believe_itself_comes_in_later)
   CHECK(hand.belief.loss == 1.0);
 }
 
-/* A position every 4 ms, and then one 2 mm beside the line: 0.5 mm at once, as of a device that
- * tells at every ms, and the rest at that pace. Nothing is held back of one that stays on its line,
- * nor of one that stops. */
+/* A position every 4 ms, and then one 2 mm beside the line: 0.5 mm a ms, as of a device that tells
+ * at every ms, once it is told again. Nothing is held back of one that stays on its line, nor of
+ * one that stops. */
 TEST(a_way_of_some_ms_comes_in_over_some_ms)
 {
   for (int wrong = 0; wrong < 2; ++wrong) {
@@ -424,7 +424,7 @@ TEST(a_way_of_some_ms_comes_in_over_some_ms)
     }
     for (int i = 0; i < 4; ++i) { /* on the line it would be at 204 */
       double off = wrong != 0 ? 2e-3 : 0.0;
-      double felt = wrong != 0 ? fmin(0.5e-3 * (i + 1), off) : off;
+      double felt = wrong != 0 ? fmin(0.5e-3 * i, off) : off;
       CHECK(hand_tell(2e-4 * 204 + off, MS));
       CHECK_NEAR(hand_x(), 2e-4 * 204 + felt, 2.1e-4); /* the line may go on for a tick */
     }
@@ -452,6 +452,56 @@ TEST(a_way_of_some_ms_comes_in_as_fast_at_every_rate)
     before = hand_x();
   }
   CHECK_NEAR(hand_x(), 0.1626, 1e-9);
+}
+
+/* A device with a position every 4 ms, at 10 kHz. For some ticks from that one on it tells what is
+ * off by x. Returns the farthest from the right way that was felt. */
+static double hand_lie(int from, int ticks, double x, double *out_pace)
+{
+  double farthest = 0.0;
+  hand_begin();
+  for (int i = 0; i < 4000; ++i) {
+    double right_x = 2e-6 * (i - i % 40);
+    int at = i - 2000;
+    (void)hand_tell(right_x + (at >= from && at < from + ticks ? x : 0.0), MS / 10);
+    farthest = i >= 2000 ? fmax(farthest, fabs(hand_x() - right_x)) : 0.0;
+    *out_pace = hapi_input_gap(&hand, 1e-4);
+    CHECK(i < 400 || fabs(*out_pace - 4e-3) < 1.1e-3);
+  }
+  return farthest;
+}
+
+/* Wherever it comes between two positions: it is passed over, or the right one comes back after as
+ * many ticks. Meanwhile the way of one gap, 80 um, and 0.5 m/s of the lie are felt. It teaches no
+ * pace. */
+TEST(what_a_seldom_device_tells_too_soon_is_passed_over)
+{
+  static const double lies[] = {5e-4, -5e-4, 1e-3, -1e-3, 2e-3, 0.011};
+  for (int lie = 0; lie < 6; ++lie) {
+    for (int from = -20; from < 40; ++from) {
+      for (int ticks = 1; ticks <= 3; ++ticks) {
+        double pace;
+        double felt = hand_lie(from, ticks, lies[lie], &pace);
+        CHECK_SAY(felt <= 0.8e-4 + 0.5e-4 * (2 * ticks + 1), "%g m for %d ticks from %d: %g m",
+                  lies[lie], ticks, from, felt);
+        CHECK_NEAR(pace, 4e-3, 1e-12);
+        CHECK(hand.belief.loss == 0.0);
+      }
+    }
+  }
+}
+
+/* One that begins to tell at every tick is followed at once, and its pace is known soon. */
+TEST(a_seldom_device_may_come_to_tell_more_often)
+{
+  hand_begin();
+  for (int i = 0; i < 4000; ++i) {
+    int every = i < 2000 ? 40 : 1;
+    CHECK(hand_tell(5e-5 * (i - i % every), MS / 10));
+    CHECK_NEAR(hand_x(), 5e-5 * i, i < 2000 ? 2e-3 : 1e-4);
+    CHECK(i < 2400 || hapi_input_gap(&hand, 1e-4) == 0.0);
+  }
+  CHECK(hand.belief.loss == 0.0 && hand.belief.doubt_s == 0.0);
 }
 
 /* Known after one way that is more than noise; not of a device that tells at every tick. */

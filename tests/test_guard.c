@@ -839,7 +839,7 @@ TEST(a_way_explains_stiffness_times_it)
     p->device.pose.position[0] = -0.005;
     p->belief.doubted = doubted != 0;
     p->belief.doubt_s = doubted != 0 ? 1e-3 : 0.0;
-    p->belief.velocity_before[0] = 0.5;
+    p->belief.way.velocity_before[0] = 0.5;
     ticks_run(1);
     CHECK_NEAR(p->device.wrench.force[0], doubted != 0 ? -(0.5 + slow) : -5.0, 1e-9);
     ticks_run(20);

@@ -163,7 +163,7 @@ static double explained_by_motion(const hapi_pointer *p, double period)
   if (p->device.jumped) {
     way = faster = 0.0;
   } else if (doubted) {
-    way = hapi_min(way, period * hapi_v3_norm(p->belief.velocity_before));
+    way = hapi_min(way, period * hapi_v3_norm(p->belief.way.velocity_before));
     faster = hapi_min(faster, HAPI_SAFETY_ACCELERATION_LIMIT * period);
   }
   if (p->shape.hull != NULL && !p->device.jumped) {

@@ -264,7 +264,7 @@ void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
         haptic->tick.guard.mode != HAP_GUARD_ON || hapi_input_judge(p, now_ns, in.doubted);
     if (slot->has_device && p->device.estimates && believed) {
       double gap = hapi_input_gap(p, haptic->tick.facts.period);
-      const hap_pose *told = gap > 0.0 ? &p->belief.told : &p->device.pose;
+      const hap_pose *told = gap > 0.0 ? hapi_input_told(p) : &p->device.pose;
       hapi_velocity_update(&p->velocity, now_ns, told, gap, &p->device.twist);
     }
     if (haptic->tick.guard.mode == HAP_GUARD_ON && believed) {

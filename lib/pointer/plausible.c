@@ -21,12 +21,21 @@
  *          what it measures. Force fades with it and then a fault is latched.
  *
  * Time between positions is what counts, not the tick: some devices tell the same position for
- * several ticks. They are known by the time before each change of more than some quanta; the
- * shortest of the newest ones counts, as a device that rested looks the same once. */
+ * several ticks. They are known by the time before each change of more than some quanta
+ * (device_pace.h).
+ *
+ * Such a device tells another position when the next one is due. Of several that come within half
+ * of that time, one is right at most. Each is judged by the way before the first of them; the one
+ * that is told for the longer time is believed. Of two as long it is the older one, until half of
+ * the time is over. So a false one that comes when one is due costs the right one about as many
+ * ticks as it lasted. It is hardly felt: what is off the line comes in once it is told again. */
 
 #define HIT_MOST \
   (HAPI_SAFETY_ACCELERATION_LIMIT * HAPI_SAFETY_JUDGE_S * HAPI_SAFETY_JUDGE_S) /* m */
-#define GAP_TICKS 1.5 /* ticks between two positions, from which on the device is slow */
+#define GAP_TICKS 1.5   /* ticks between two positions, from which on the device is slow */
+#define VOTE_TICKS 3.5  /* the same, from which on some of them can vote */
+#define SURE_SHARE 0.25 /* of the time between two positions */
+#define SOON_SHARE 0.5  /* of the time between two, before which another one is too early */
 
 static double seconds_between(int64_t from_ns, int64_t to_ns)
 {
@@ -70,62 +79,38 @@ static double off_way(const double from[3], const double velocity[3], double sec
   return hapi_v3_norm(out);
 }
 
-/* s between two positions, where they come seldom. */
-static double gap_of(const hapi_pointer_belief *b)
-{
-  double least = b->gaps[0];
-  for (int i = 1; i < HAPI_BELIEF_GAPS; ++i) {
-    least = hapi_min(least, b->gaps[i]);
-  }
-  return least;
-}
-
 static double gap_or_tick(const hapi_pointer_belief *b)
 {
-  return hapi_max(gap_of(b), HAPI_SAFETY_JUDGE_S);
+  return hapi_max(b->way.pace.gap, HAPI_SAFETY_JUDGE_S);
 }
 
-static bool pose_is_plausible(const hapi_pointer *p, int64_t now_ns)
+static bool pose_is_plausible(const hapi_pointer *p, const hapi_believed_way *w, int64_t now_ns)
 {
-  const hapi_pointer_belief *b = &p->belief;
   const hap_pose *pose = &p->device.pose;
-  double passed = seconds_between(b->line_ns, now_ns);
-  double tick = seconds_between(b->read_ns, now_ns);
-  double time = hapi_min(passed, hapi_max(gap_of(b), tick));
+  double passed = seconds_between(w->line_ns, now_ns);
+  double tick = seconds_between(p->belief.read_ns, now_ns);
+  double time = hapi_min(passed, hapi_max(w->pace.gap, tick));
   double way[3];
   double from_way[3];
-  hapi_v3_sub(pose->position, b->line.position, way);
+  hapi_v3_sub(pose->position, w->line.position, way);
   /* What is told now may be of any time in the last tick. */
-  bool off = off_way(b->line.position, b->velocity, passed + tick, pose->position, from_way) >
-             way_most(p, time, b->off);
+  bool off = off_way(w->line.position, w->velocity, passed + tick, pose->position, from_way) >
+             way_most(p, time, w->off);
   if (hapi_v3_norm(way) > HAPI_SAFETY_SPEED_LIMIT * hapi_max(passed, HAPI_SAFETY_JUDGE_S)) {
     return false;
   }
-  bool turned = pointer_turns(p) && turn_between(pose->quat_wxyz, b->line.quat_wxyz) >
-                                        b->spin * passed + HAPI_SAFETY_SPIN_CHANGE *
+  bool turned = pointer_turns(p) && turn_between(pose->quat_wxyz, w->line.quat_wxyz) >
+                                        w->spin * passed + HAPI_SAFETY_SPIN_CHANGE *
                                                                hapi_max(time, HAPI_SAFETY_JUDGE_S);
-  return !b->paced || (!off && !turned);
+  return !p->belief.paced || (!off && !turned);
 }
 
-static bool is_news(const hapi_pointer *p)
+static bool is_news(const hapi_pointer *p, const hap_pose *told)
 {
   const hap_pose *pose = &p->device.pose;
-  const hap_pose *told = &p->belief.told;
   return memcmp(pose->position, told->position, sizeof pose->position) != 0 ||
          (pointer_turns(p) &&
           memcmp(pose->quat_wxyz, told->quat_wxyz, sizeof pose->quat_wxyz) != 0);
-}
-
-/* The first gap stands for all, unless the device rested before. */
-static void gap_note(hapi_pointer_belief *b, double seconds)
-{
-  if (!(gap_of(b) > 0.0) && seconds < HAPI_SAFETY_GAP_MOST_S) {
-    for (int i = 0; i < HAPI_BELIEF_GAPS; ++i) {
-      b->gaps[i] = seconds;
-    }
-  }
-  b->gaps[b->gap_at] = hapi_min(seconds, HAPI_SAFETY_GAP_MOST_S);
-  b->gap_at = (b->gap_at + 1) % HAPI_BELIEF_GAPS;
 }
 
 /* Whether the pose goes on from those elsewhere. */
@@ -148,11 +133,8 @@ static bool goes_on(const hapi_pointer *p, const double way[3], double tick)
 static void tell_seldom(hapi_pointer_belief *b, int64_t now_ns)
 {
   double since = b->elsewhere.since;
-  double before = seconds_between(b->sample_ns, now_ns) - since;
-  double gap = hapi_max(hapi_min(2.0 * gap_of(b), before), since);
-  for (int i = 0; i < HAPI_BELIEF_GAPS; ++i) {
-    gap_note(b, gap);
-  }
+  double before = seconds_between(b->way.sample_ns, now_ns) - since;
+  hapi_device_pace_set(&b->way.pace, hapi_max(hapi_min(2.0 * b->way.pace.gap, before), since));
 }
 
 /* A pose that is not plausible. True: poses have gone on from there for long enough. */
@@ -168,9 +150,12 @@ static bool follow_elsewhere(hapi_pointer *p, double seconds, int64_t now_ns)
     return false;
   }
   e->seconds += seconds;
+  if (!e->moved && hapi_v3_norm(way) > way_most(p, e->since, 0.0)) {
+    e->seconds = 0.0; /* a second place so far away as well: which is it? */
+  }
   if (hapi_v3_norm(way) > 0.0 && e->since > 0.0) {
     hapi_v3_scale(1.0 / e->since, way, e->velocity);
-    gap_note(&p->belief, e->since);
+    hapi_device_pace_note(&p->belief.way.pace, e->since);
     e->moved = true;
     e->since = 0.0;
   }
@@ -199,42 +184,43 @@ static void elsewhere_fade(hapi_elsewhere *e, double seconds)
 static void line_take(hapi_pointer *p, int64_t now_ns, bool leapt)
 {
   hapi_pointer_belief *b = &p->belief;
-  double passed = seconds_between(b->line_ns, now_ns);
+  hapi_believed_way *w = &b->way;
+  double passed = seconds_between(w->line_ns, now_ns);
   double way[3];
-  hapi_v3_sub(p->device.pose.position, b->line.position, way);
-  hapi_v3_copy(b->velocity, b->velocity_before);
+  hapi_v3_sub(p->device.pose.position, w->line.position, way);
+  hapi_v3_copy(w->velocity, w->velocity_before);
   if (leapt) {
-    hapi_v3_copy(b->elsewhere.velocity, b->velocity);
-    b->off = HAPI_SAFETY_SWING_LIMIT * HAPI_SAFETY_GAP_MOST_S * HAPI_SAFETY_GAP_MOST_S;
+    hapi_v3_copy(b->elsewhere.velocity, w->velocity);
+    w->off = HAPI_SAFETY_SWING_LIMIT * HAPI_SAFETY_GAP_MOST_S * HAPI_SAFETY_GAP_MOST_S;
   } else if (passed > 0.0) {
     double off[3];
-    hapi_v3_madd(way, -passed, b->velocity, off);
-    b->off = hapi_v3_norm(off);
-    hapi_v3_scale(1.0 / passed, way, b->velocity);
-    b->spin =
-        pointer_turns(p) ? turn_between(p->device.pose.quat_wxyz, b->line.quat_wxyz) / passed : 0.0;
+    hapi_v3_madd(way, -passed, w->velocity, off);
+    w->off = hapi_v3_norm(off);
+    hapi_v3_scale(1.0 / passed, way, w->velocity);
+    w->spin =
+        pointer_turns(p) ? turn_between(p->device.pose.quat_wxyz, w->line.quat_wxyz) / passed : 0.0;
   }
-  b->line = p->device.pose;
-  b->line_ns = now_ns;
+  w->line = p->device.pose;
+  w->line_ns = now_ns;
   b->paced = true;
 }
 
 /* At a new place, which the device told after so long. The line is made of poses that are not too
  * near in time: else its velocity would be noise, and the bound another one at each rate. */
-static void sample_take(hapi_pointer *p, int64_t now_ns, bool leapt)
+static void sample_take(hapi_pointer *p, int64_t now_ns, int64_t due_ns, bool leapt)
 {
-  hapi_pointer_belief *b = &p->belief;
+  hapi_believed_way *w = &p->belief.way;
   double step[3];
-  hapi_v3_sub(p->device.pose.position, b->told.position, step);
+  hapi_v3_sub(p->device.pose.position, w->told.position, step);
   double least = hapi_max(HAPI_SAFETY_QUANTA * p->velocity.quantum, HAPI_SAFETY_STEP_LEAST);
   if (!leapt && hapi_v3_norm(step) > least) {
-    gap_note(b, seconds_between(b->sample_ns, now_ns));
+    hapi_device_pace_note(&w->pace, seconds_between(w->sample_ns, due_ns));
   }
-  if (leapt || seconds_between(b->line_ns, now_ns) > 0.5 * HAPI_SAFETY_JUDGE_S) {
+  if (leapt || seconds_between(w->line_ns, now_ns) > 0.5 * HAPI_SAFETY_JUDGE_S) {
     line_take(p, now_ns, leapt);
   }
-  b->told = p->device.pose;
-  b->sample_ns = now_ns;
+  w->told = p->device.pose;
+  w->sample_ns = due_ns;
 }
 
 /* From where it was felt last: what is nearer comes in as it is, a little late. */
@@ -256,15 +242,15 @@ static double shorter_of(double a, double b)
  * velocities the smaller counts: the last pose before may have been false, too. */
 static void pose_carry(hapi_pointer *p, int64_t now_ns)
 {
-  const hapi_pointer_belief *b = &p->belief;
-  double passed = seconds_between(b->believe_ns, now_ns);
+  const hapi_believed_way *w = &p->belief.way;
+  double passed = seconds_between(p->belief.believe_ns, now_ns);
   double velocity[3];
   for (int i = 0; i < 3; ++i) {
-    velocity[i] = shorter_of(b->velocity[i], b->velocity_before[i]);
+    velocity[i] = shorter_of(w->velocity[i], w->velocity_before[i]);
   }
   (void)hapi_v3_shorten(velocity, HAPI_SAFETY_CARRY_SPEED);
-  p->device.pose = b->told;
-  hapi_v3_madd(b->told.position, hapi_min(passed, HAPI_SAFETY_CARRY_S), velocity,
+  p->device.pose = w->told;
+  hapi_v3_madd(w->told.position, hapi_min(passed, HAPI_SAFETY_CARRY_S), velocity,
                p->device.pose.position);
   memset(&p->device.twist, 0, sizeof p->device.twist);
   if (passed <= HAPI_SAFETY_CARRY_S) {
@@ -293,33 +279,77 @@ static void doubt_follow(hapi_pointer *p, bool doubted, double seconds)
  */
 static void late_take(hapi_pointer *p, int64_t now_ns, double tick)
 {
-  hapi_pointer_belief *b = &p->belief;
-  double passed = seconds_between(b->line_ns, now_ns) + tick;
+  hapi_believed_way *w = &p->belief.way;
+  double passed = seconds_between(w->line_ns, now_ns) + tick;
   double off[3];
-  if (!(hapi_input_gap(p, tick) > 0.0) || b->jumped) {
-    hapi_v3_set(b->late, 0.0, 0.0, 0.0);
+  if (!(hapi_input_gap(p, tick) > 0.0) || p->belief.jumped) {
+    hapi_v3_set(w->late, 0.0, 0.0, 0.0);
     return;
   }
-  double way = off_way(b->line.position, b->velocity, passed, p->device.pose.position, off);
-  double share = hapi_min(tick / HAPI_SAFETY_JUDGE_S, 1.0); /* later ticks bring the rest */
-  double most = share * HIT_MOST + HAPI_SAFETY_QUANTA * p->velocity.quantum;
+  double way = off_way(w->line.position, w->velocity, passed, p->device.pose.position, off);
+  double most = HAPI_SAFETY_QUANTA * p->velocity.quantum;
   if (way > most) {
-    hapi_v3_madd(b->late, 1.0 - most / way, off, b->late);
+    hapi_v3_madd(w->late, 1.0 - most / way, off, w->late);
   }
 }
 
-static void late_follow(hapi_pointer_belief *b, double seconds)
+static void late_follow(hapi_believed_way *w, double seconds)
 {
   double comes = HIT_MOST / HAPI_SAFETY_JUDGE_S * seconds;
-  (void)hapi_v3_shorten(b->late, hapi_max(hapi_v3_norm(b->late) - comes, 0.0));
+  (void)hapi_v3_shorten(w->late, hapi_max(hapi_v3_norm(w->late) - comes, 0.0));
 }
 
 /* It stands still. */
-static void rest_take(hapi_pointer_belief *b)
+static void rest_take(hapi_believed_way *w)
 {
-  hapi_v3_set(b->velocity, 0.0, 0.0, 0.0);
-  hapi_v3_set(b->velocity_before, 0.0, 0.0, 0.0);
-  b->spin = b->off = 0.0;
+  hapi_v3_set(w->velocity, 0.0, 0.0, 0.0);
+  hapi_v3_set(w->velocity_before, 0.0, 0.0, 0.0);
+  w->spin = w->off = 0.0;
+}
+
+/* Too early for another position of a device that tells each for some time. */
+static bool is_soon(const hapi_believed_way *w, int64_t now_ns, double tick)
+{
+  return w->pace.gap > VOTE_TICKS * tick &&
+         seconds_between(w->sample_ns, now_ns) < SOON_SHARE * w->pace.gap;
+}
+
+/* Whether the pose that came last has to give way to the one that is told now. Soon after it this
+ * one is a vote against it; a later one counts as long as the last one has no votes. */
+static bool votes_turn(hapi_pointer *p, bool soon, int64_t now_ns, double tick)
+{
+  hapi_pointer_belief *b = &p->belief;
+  bool back = !is_news(p, &b->before.told);
+  b->votes -= soon ? tick : 0.0;
+  double least = soon && !back ? -0.5 * tick : 0.5 * tick;
+  return b->votes < least && (back || !b->paced || pose_is_plausible(p, &b->before, now_ns));
+}
+
+/* s that a pose has to be told before a velocity is made of it: a damper makes force of it at
+ * once. */
+static double sure_after(const hapi_pointer_belief *b)
+{
+  return hapi_min(HAPI_SAFETY_JUDGE_S, SURE_SHARE * b->way.pace.gap);
+}
+
+/* The pose that is told stays, though the device tells another one. */
+static void pose_keep(hapi_pointer *p)
+{
+  const hapi_believed_way *w = &p->belief.way;
+  p->device.pose = w->told;
+  hapi_v3_copy(w->velocity, p->device.twist.linear);
+}
+
+static void way_begin(hapi_pointer_belief *b, const hap_pose *pose, int64_t now_ns)
+{
+  b->known = true;
+  b->paced = false;
+  b->way =
+      (hapi_believed_way){.sample_ns = now_ns, .told = *pose, .line_ns = now_ns, .line = *pose};
+  b->before = b->way;
+  b->elsewhere.known = false;
+  b->votes = 0.0;
+  b->sure = true;
 }
 
 bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
@@ -334,17 +364,28 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
     return true;
   }
   if (!b->known || seconds < 0.0 || seconds > HAPI_SAFETY_UNREAD_S) {
-    b->known = true;
-    b->paced = false;
-    memset(b->gaps, 0, sizeof b->gaps);
-    b->told = b->line = p->device.pose;
-    b->sample_ns = b->line_ns = now_ns;
-    b->elsewhere.known = false;
     seconds = 0.0;
-    rest_take(b);
+    way_begin(b, &p->device.pose, now_ns);
   }
-  bool news = is_news(p);
-  bool believed = !news || pose_is_plausible(p, now_ns);
+  bool news = is_news(p, &b->way.told);
+  bool soon = news && is_soon(&b->way, now_ns, seconds);
+  bool torn = soon && !pose_is_plausible(p, &b->way, now_ns);
+  bool turns = news && votes_turn(p, soon, now_ns, seconds);
+  int64_t due_ns = turns ? b->way.sample_ns : now_ns;
+  if (turns) {
+    b->way = b->before;
+    b->votes = 0.0;
+    b->sure = soon = false;
+    news = is_news(p, &b->way.told);
+  }
+  if (!news) {
+    b->votes += seconds;
+    b->sure = b->sure || turns || b->votes > sure_after(b) - 0.5 * seconds;
+  }
+  if (!soon && !turns) {
+    late_follow(&b->way, seconds);
+  }
+  bool believed = !news || pose_is_plausible(p, &b->way, now_ns);
   bool leapt = false;
   if (!believed) {
     believed = leapt = follow_elsewhere(p, seconds, now_ns);
@@ -352,14 +393,19 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
   } else {
     elsewhere_fade(&b->elsewhere, seconds);
   }
-  double stood = seconds_between(b->sample_ns, now_ns);
+  double stood = seconds_between(b->way.sample_ns, now_ns);
   b->paced = b->paced || stood > HAPI_SAFETY_GAP_MOST_S;
-  late_follow(b, seconds);
-  if (believed && news) {
+  if (believed && soon && !leapt) {
+    pose_keep(p);
+  } else if (believed && news) {
+    b->before = b->way;
+    b->votes = seconds;
+    b->sure = false;
     late_take(p, now_ns, seconds);
-    sample_take(p, now_ns, leapt);
+    sample_take(p, now_ns, due_ns, leapt);
+    b->before = leapt ? b->way : b->before;
   } else if (believed && stood > HAPI_SAFETY_REST_GAPS * gap_or_tick(b)) {
-    rest_take(b);
+    rest_take(&b->way);
   }
   if (believed) {
     b->elsewhere.known = b->elsewhere.known && !leapt;
@@ -367,16 +413,22 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted)
   } else {
     pose_carry(p, now_ns);
   }
-  hapi_v3_sub(p->device.pose.position, b->late, p->device.pose.position);
+  hapi_v3_sub(p->device.pose.position, b->way.late, p->device.pose.position);
   b->read_ns = now_ns;
-  doubt_follow(p, doubted || !believed, seconds);
+  doubt_follow(p, doubted || torn || !believed, seconds);
   return believed;
 }
 
 double hapi_input_gap(const hapi_pointer *pointer, double period)
 {
-  double gap = gap_of(&pointer->belief);
+  double gap = pointer->belief.way.pace.gap;
   return gap > GAP_TICKS * period ? gap : 0.0;
+}
+
+const hap_pose *hapi_input_told(const hapi_pointer *pointer)
+{
+  const hapi_pointer_belief *b = &pointer->belief;
+  return b->sure ? &b->way.told : &b->before.told;
 }
 
 void hapi_input_judge_twist(hapi_pointer *pointer)
@@ -391,12 +443,12 @@ void hapi_input_judge_twist(hapi_pointer *pointer)
     return;
   }
   if (!p->device.estimates) { /* it may be newer than the line by a gap and a half */
-    most += 1.5 * HAPI_SAFETY_SWING_LIMIT * gap_of(b);
+    most += 1.5 * HAPI_SAFETY_SWING_LIMIT * b->way.pace.gap;
   }
-  hapi_v3_sub(v, b->velocity, off);
+  hapi_v3_sub(v, b->way.velocity, off);
   if (hapi_v3_dot(off, off) > most * most) {
     (void)hapi_v3_shorten(off, most);
-    hapi_v3_add(b->velocity, off, v);
+    hapi_v3_add(b->way.velocity, off, v);
   }
 }
 

@@ -16,6 +16,9 @@ bool hapi_input_judge(hapi_pointer *pointer, int64_t now_ns, bool doubted);
  * or it is not known yet. */
 double hapi_input_gap(const hapi_pointer *pointer, double period);
 
+/* Of such a device: the pose that it told last for long enough. */
+const hap_pose *hapi_input_told(const hapi_pointer *pointer);
+
 /* Of a believed pose: a twist that the way of the poses does not explain is brought near to theirs.
  * A damper makes force of a velocity at once. Nothing is done where the pose is not judged. */
 void hapi_input_judge_twist(hapi_pointer *pointer);

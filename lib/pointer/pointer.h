@@ -13,6 +13,7 @@
 #include <hapode/pointer.h>
 #include <hapode/spatial.h>
 
+#include "pointer/belief.h"
 #include "pointer/declared.h"
 #include "pointer/grab.h"
 #include "pointer/holds.h"
@@ -67,42 +68,6 @@ typedef struct hapi_pointer_device {
   hap_pose good;     /* the last pose that could be used */
   hapi_device_limits limits;
 } hapi_pointer_device;
-
-#define HAPI_BELIEF_GAPS 4
-
-/* Where a device that is not believed says it is. */
-typedef struct hapi_elsewhere {
-  bool known; /* else it is believed */
-  bool moved; /* there is a velocity */
-  hap_pose pose;
-  double velocity[3];
-  double since;   /* s, without another pose */
-  double seconds; /* that poses have gone on from there */
-} hapi_elsewhere;
-
-/* What the device is taken to do, see plausible.c. Device frame. Zeroed: nothing is known. */
-typedef struct hapi_pointer_belief {
-  bool known;
-  bool paced;   /* the velocity is known, too */
-  bool jumped;  /* in this tick: it is believed to be where nobody saw it go */
-  bool doubted; /* in this tick: carried on, or the device says so */
-  uint32_t gap_at;
-  int64_t read_ns;    /* of the last read */
-  int64_t believe_ns; /* of the last one that was believed */
-  int64_t sample_ns;  /* of the last one of those that was another one than before: */
-  hap_pose told;
-  int64_t line_ns; /* of the pose from which the line begins: */
-  hap_pose line;
-  double velocity[3];
-  double velocity_before[3];     /* of the line before it */
-  double off;                    /* m, of this pose from that line */
-  double spin;                   /* rad/s */
-  double gaps[HAPI_BELIEF_GAPS]; /* s, before the newest steps: a ring */
-  hapi_elsewhere elsewhere;
-  double late[3]; /* m, of the position told last: not felt yet */
-  double doubt_s;
-  double loss; /* 0..1, share of the force that doubt has taken */
-} hapi_pointer_belief;
 
 /* Stiffnesses as felt in the world: the device's / (motion_scale force_scale). The turning is of a
  * hull only. */

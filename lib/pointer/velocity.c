@@ -42,7 +42,7 @@ static void add_sample(hapi_velocity *velocity, int64_t time_ns, const hap_pose 
   if (told && since < LATE_GAPS * gap) {
     return;
   }
-  bool late = !told && velocity->again && since < SOON_GAPS * gap;
+  bool late = !told && since < SOON_GAPS * gap;
   if (velocity->count == 0 || (time_ns > before->time_ns && !late)) {
     velocity->newest = (velocity->newest + 1) % HAPI_VELOCITY_SAMPLES;
     velocity->count += velocity->count < HAPI_VELOCITY_SAMPLES;

@@ -48,6 +48,7 @@ AREAS = [
     ("lib/device/watchdog.c", WATCH_TESTS),
     ("lib/haptic/standstill.c", WATCH_TESTS),
     ("lib/guard/*.c", GUARD_TESTS + GRIP_TESTS),
+    ("lib/pointer/device_pace.c", ["device_pace", "false_input"]),
     ("lib/pointer/plausible.c", ["safety_numbers", "false_input", "faults", "late"]),
     ("lib/base/safety.h", GUARD_TESTS + GRIP_TESTS + FEEL_TESTS + WATCH_TESTS +
      SPIDAR_TESTS + CONTACT_TESTS + ["spidar_guard"]),

@@ -1,0 +1,38 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "pointer/device_pace.h"
+
+#include "base/safety.h"
+#include "base/vec.h"
+
+/* Of one or two the shorter, of eight the fourth. */
+static double pace_median(const hapi_device_pace *pace)
+{
+  double sorted[HAPI_DEVICE_PACE_GAPS];
+  uint32_t count = pace->noted < HAPI_DEVICE_PACE_GAPS ? pace->noted : HAPI_DEVICE_PACE_GAPS;
+  for (uint32_t i = 0; i < count; ++i) {
+    uint32_t at = i;
+    for (; at > 0 && sorted[at - 1] > pace->gaps[i]; --at) {
+      sorted[at] = sorted[at - 1];
+    }
+    sorted[at] = pace->gaps[i];
+  }
+  return sorted[(count - 1) / 2];
+}
+
+void hapi_device_pace_note(hapi_device_pace *pace, double seconds)
+{
+  if (seconds <= HAPI_SAFETY_GAP_MOST_S) {
+    pace->gaps[pace->noted % HAPI_DEVICE_PACE_GAPS] = seconds;
+    pace->noted =
+        pace->noted + 1 < 2 * HAPI_DEVICE_PACE_GAPS ? pace->noted + 1 : HAPI_DEVICE_PACE_GAPS;
+    pace->gap = pace_median(pace);
+  }
+}
+
+void hapi_device_pace_set(hapi_device_pace *pace, double seconds)
+{
+  for (uint32_t i = 0; i < HAPI_DEVICE_PACE_GAPS; ++i) {
+    hapi_device_pace_note(pace, hapi_min(seconds, HAPI_SAFETY_GAP_MOST_S));
+  }
+}
