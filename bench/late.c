@@ -55,7 +55,8 @@ typedef struct late_felt {
   unsigned steps;
 } late_felt;
 
-static void felt_take(late_felt *felt, const double force[3])
+/* explained: N, of a change from tick to tick that is right. */
+static void felt_take(late_felt *felt, const double force[3], double explained)
 {
   double change = 0.0;
   double norm = 0.0;
@@ -66,7 +67,7 @@ static void felt_take(late_felt *felt, const double force[3])
   }
   felt->peak = fmax(felt->peak, sqrt(norm));
   felt->step = fmax(felt->step, sqrt(change));
-  felt->steps += sqrt(change) > LATE_STEP_N;
+  felt->steps += sqrt(change) > fmax(LATE_STEP_N, explained);
 }
 
 /* How the first pointer of a run is looked at. */
@@ -78,8 +79,9 @@ typedef struct late_look {
   int ticks;    /* since then */
 } late_look;
 
-static void hand_look(const rig *r, const late_def *def, int tick, const hap_pointer_state *state,
-                      late_look *io, late_result *out)
+/* N, by which the force may change in this tick as its truth does; 0: not known. */
+static double hand_look(const rig *r, const late_def *def, int tick, const hap_pointer_state *state,
+                        late_look *io, late_result *out)
 {
   const double *force = state->wrench.force;
   double newtons = hapi_v3_norm(force);
@@ -87,16 +89,20 @@ static void hand_look(const rig *r, const late_def *def, int tick, const hap_poi
   hapi_v3_sub(state->device.position, io->at, moved);
   hapi_v3_scale(LATE_HZ / (double)io->ticks, moved, moved);
   hapi_v3_copy(state->device.position, io->at);
+  int ticks = io->ticks;
   io->ticks = 0;
   if (def->course != NULL && tick < LATE_TICKS_MAX) {
     def->course->force[tick] = newtons;
     def->course->speed[tick] =
         newtons > 0.0 ? fmax(-hapi_v3_dot(force, moved) / newtons, 0.0) : 0.0;
   }
-  if (io->hand.prescribed && (state->guard & HAP_GUARD_FAULT) == 0) { /* a fault fades */
-    double most = late_spring(r->scene, r->session, io->at, hapi_v3_norm(moved), &io->bodies);
-    out->beyond = most >= 0.0 ? fmax(out->beyond, newtons - most) : out->beyond;
+  if (!io->hand.prescribed || (state->guard & HAP_GUARD_FAULT) != 0) { /* a fault fades */
+    return 0.0;
   }
+  const late_place place = {io->at, ticks, (state->guard & HAP_GUARD_LATE) != 0};
+  late_true now = late_spring(r->scene, r->session, &place, &io->bodies);
+  out->beyond = now.known ? fmax(out->beyond, newtons - now.most) : out->beyond;
+  return now.known ? now.change + LATE_BEYOND_N : 0.0;
 }
 
 static hap_status late_tick(bench *b, const rig *r, const late_def *def, int tick, late_look *io,
@@ -113,11 +119,9 @@ static hap_status late_tick(bench *b, const rig *r, const late_def *def, int tic
     return bench_explain(b, r->session, status);
   }
   (void)hap_pointer_get(r->session, r->pointers[0], &state, sizeof state);
-  felt_take(&io->felt, state.wrench.force);
   ++io->ticks;
-  if (!stops) {
-    hand_look(r, def, tick, &state, io, out);
-  }
+  double explained = stops ? 0.0 : hand_look(r, def, tick, &state, io, out);
+  felt_take(&io->felt, state.wrench.force, explained);
   return HAP_OK;
 }
 

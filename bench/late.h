@@ -53,9 +53,9 @@ typedef struct late_def {
 
 /* Of the first pointer. */
 typedef struct late_result {
-  double peak; /* N */
-  double step; /* N, largest change from tick to tick */
-  unsigned steps;
+  double peak;     /* N */
+  double step;     /* N, largest change from tick to tick */
+  unsigned steps;  /* above LATE_STEP_N; of a prescribed hand: and more than its truth changes */
   double pulled;   /* N, largest of the strings on the grip; of a SPIDAR */
   bool deep_known; /* of a prescribed hand among boxes, planes and balls: */
   double beyond;   /* N, largest of a force beyond that of the spring at its true depth */

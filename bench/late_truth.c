@@ -31,6 +31,7 @@
 
 #define LATE_TRUTH_HZ 1000.0 /* of the loop */
 #define GAP_MOST 5           /* ms, that take no force */
+#define LATE_TAKES 0.25      /* of the force, that less force for late ticks takes in one of them */
 
 late_hand late_hand_of(const char *spec)
 {
@@ -89,6 +90,11 @@ double late_demands(const late_hand *hand, const late_touch *touch, double force
 
 /* ---- the spring at its true depth ---- */
 
+static double length_of(const double v[3])
+{
+  return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
 /* m, of a ball in a box; at: its middle in the box's frame. */
 static double box_depth(const double at[3], const double edges[3], double radius)
 {
@@ -125,8 +131,14 @@ static double geom_depth(dGeomID geom, const hap_pose *pose, const double at[3],
     }
   }
   if (dGeomGetClass(geom) == dSphereClass) {
-    double apart = sqrt(local[0] * local[0] + local[1] * local[1] + local[2] * local[2]);
-    return radius + dGeomSphereGetRadius(geom) - apart;
+    return radius + dGeomSphereGetRadius(geom) - length_of(local);
+  }
+  if (dGeomGetClass(geom) == dCapsuleClass) {
+    dReal thick;
+    dReal length;
+    dGeomCapsuleGetParams(geom, &thick, &length);
+    local[2] -= fmax(fmin(local[2], 0.5 * length), -0.5 * length);
+    return radius + thick - length_of(local);
   }
   dGeomBoxGetLengths(geom, edges);
   return box_depth(local, edges, radius);
@@ -147,35 +159,70 @@ static bool scene_is_simple(const scene *s)
   bool simple = s->body_count <= LATE_BODIES_MAX && !(s->parameters.tool[0] > 0.0);
   for (int i = 0; i < dSpaceGetNumGeoms(s->space); ++i) {
     int kind = dGeomGetClass(dSpaceGetGeom(s->space, i));
-    simple = simple && (kind == dBoxClass || kind == dPlaneClass || kind == dSphereClass);
+    simple = simple && (kind == dBoxClass || kind == dPlaneClass || kind == dSphereClass ||
+                        kind == dCapsuleClass);
   }
   return simple;
 }
 
-double late_spring(const scene *s, hap_session *session, const double at[3], double moved,
-                   late_bodies *io)
+/* N, of spring and damper at a depth that grows at a rate. */
+static double spring_force(const scene_parameters *p, double depth, double rate)
+{
+  return fmax(p->stiffness * depth + p->damping * rate, 0.0);
+}
+
+/* A tick may know a touch as it begins or as it ends: both are right. */
+static void geom_press(const scene *s, dGeomID geom, const double at[3], int ticks,
+                       const late_bodies *before, late_bodies *io)
 {
   const scene_parameters *p = &s->parameters;
+  const hap_pose *pose = body_pose(s, before, geom);
+  double was = geom_depth(geom, pose, before->at, p->radius);
+  double begins = geom_depth(geom, pose, at, p->radius);
+  double ends = geom_depth(geom, body_pose(s, io, geom), at, p->radius);
+  double rate = LATE_TRUTH_HZ * ((begins - was) / ticks + ends - begins);
+  double early = ends > 0.0 ? spring_force(p, ends, rate) : 0.0;
+  double late = begins > 0.0 ? spring_force(p, begins, rate) : 0.0;
+  io->lowest += fmin(early, late);
+  io->highest += fmax(early, late);
+}
+
+late_true late_spring(const scene *s, hap_session *session, const late_place *place,
+                      late_bodies *io)
+{
+  const double *at = place->at;
+  const int ticks = place->ticks;
+  const scene_parameters *p = &s->parameters;
   const late_bodies before = *io;
+  const double way[3] = {at[0] - io->at[0], at[1] - io->at[1], at[2] - io->at[2]};
+  double moved = LATE_TRUTH_HZ * length_of(way) / ticks;
   double depth = 0.0;
   double speed = 0.0;
   io->known = scene_is_simple(s) &&
               hap_session_poses_now(session, s->bodies, s->body_count, io->poses) >= HAP_OK;
+  memcpy(io->at, at, sizeof io->at);
+  io->lowest = io->highest = io->speed = 0.0;
   if (!io->known || !before.known) {
-    return -1.0;
+    return (late_true){.known = false};
   }
   for (int i = 0; i < dSpaceGetNumGeoms(s->space); ++i) {
     dGeomID geom = dSpaceGetGeom(s->space, i);
     const hap_pose *pose = body_pose(s, &before, geom);
     double deep = geom_depth(geom, pose, at, p->radius);
+    geom_press(s, geom, at, ticks, &before, io);
     if (deep > 0.0) {
       depth += deep;
       for (int k = 0; pose != NULL && k < 3; ++k) {
-        double way = body_pose(s, io, geom)->position[k] - pose->position[k];
-        speed = fmax(speed, fabs(way) * LATE_TRUTH_HZ);
+        double went = body_pose(s, io, geom)->position[k] - pose->position[k];
+        speed = fmax(speed, fabs(went) * LATE_TRUTH_HZ);
       }
     }
   }
+  io->speed = speed;
+  speed = fmax(speed, before.speed); /* a sync moves a body between two ticks */
   double press = p->stiffness * depth + (depth > 0.0 ? p->damping * (moved + 2.0 * speed) : 0.0);
-  return press * sqrt(1.0 + p->friction * p->friction);
+  double rubs = sqrt(1.0 + p->friction * p->friction);
+  double rises = io->highest - before.lowest;
+  double falls = before.highest - (place->less ? 1.0 - LATE_TAKES : 1.0) * io->lowest;
+  return (late_true){true, press * rubs, rubs * fmax(rises, falls)};
 }

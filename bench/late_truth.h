@@ -42,12 +42,29 @@ double late_demands(const late_hand *hand, const late_touch *touch, double force
 typedef struct late_bodies {
   bool known;
   hap_pose poses[LATE_BODIES_MAX];
+  double at[3];  /* m, of the ball */
+  double speed;  /* m/s, of the fastest that is touched */
+  double lowest; /* N, between which the force of spring and damper was there */
+  double highest;
 } late_bodies;
 
-/* N, at most, that spring, damper and friction of a ball at a place give in what the scene has of
- * boxes, planes and balls, where the bodies were after the tick before; moved: m/s, of the ball.
- * Then the bodies are as they are now. Negative: nothing is known. */
-double late_spring(const scene *s, hap_session *session, const double at[3], double moved,
-                   late_bodies *io);
+/* What spring, damper and friction of a ball give in what the scene has of boxes, planes, balls and
+ * capsules. */
+typedef struct late_true {
+  bool known;
+  double most;   /* N, at most, where the bodies were after the tick before */
+  double change; /* N, at most, since the tick before: as a body that comes at v meets the damper,
+                    d v is there at once, and k v T comes a tick */
+} late_true;
+
+typedef struct late_place {
+  const double *at; /* m, of the ball */
+  int ticks;        /* since the place before */
+  bool less;        /* late ticks take some of the force */
+} late_place;
+
+/* Then the bodies are as they are now. */
+late_true late_spring(const scene *s, hap_session *session, const late_place *place,
+                      late_bodies *io);
 
 #endif

@@ -10,6 +10,7 @@
 #include "bench/late.h"
 #include "guard/lateness.h"
 #include "tests/tick_world.h"
+#include "tools/rig.h"
 
 #define LIMIT 20.0 /* N */
 
@@ -431,6 +432,63 @@ TEST(what_the_energy_observer_gives_back_under_less_force_comes_slowly)
   CHECK_NEAR(p->device.wrench.force[0], -LIMIT / 12.5, 1e-9);
 }
 
+TEST(less_force_comes_slowly_though_the_hand_draws_back)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  p->device.limits.max_force = 10.0;
+  ticks_miss(19);
+  double before = 5.0;
+  for (int i = 0; i < 20; ++i) {
+    p->device.pose.position[0] -= 1e-5;
+    ticks_run(1);
+    double force = -p->device.wrench.force[0];
+    CHECK(before - force <= 0.8 + 1e-9 && force <= -p->guard.wanted.force[0] + 1e-9);
+    before = force;
+  }
+  p->device.pose.position[0] -= 2e-3; /* what the world asks no more goes at once */
+  ticks_run(1);
+  CHECK(-p->device.wrench.force[0] <= -p->guard.wanted.force[0] + 1e-9);
+}
+
+/* 5 N in a touch with a gap, long after it; the hand draws back by 10 um a tick, and the ledger
+ * pays for 50 uJ and its overdraft. Returns the largest change of force; *out_given: J to the
+ * hand. */
+static double debt_taken(bool in_touch, double *out_given)
+{
+  hapi_pointer *p = late_wall(HAP_MODEL_CONTACT);
+  double step = 0.0;
+  double before = 5.0;
+  ticks_run(300);
+  f.tick.guard.late.in_touch = in_touch;
+  f.tick.guard.touch_s = 0.0;
+  f.tick.guard.balance = 5e-5;
+  *out_given = 0.0;
+  for (int i = 0; i < 50; ++i) {
+    p->device.pose.position[0] -= 1e-5;
+    *out_given += 1e-5 * before;
+    ticks_run(1);
+    double force = -p->device.wrench.force[0];
+    step = fmax(step, fabs(force - before));
+    before = force;
+  }
+  CHECK(before < 0.01);
+  return step;
+}
+
+TEST(a_debt_that_a_gap_left_takes_the_force_in_some_ticks_and_costs_no_more)
+{
+  double once_given;
+  double eased_given;
+  double once = debt_taken(false, &once_given);
+  double eased = debt_taken(true, &eased_given);
+  double overdraft = fmax(HAPI_SAFETY_OVERDRAFT * f.tick.guard.stored_max, 1e-5);
+  printf("# %.3g N at once, %.3g N; gave %.4g and %.4g mJ\n", once, eased, 1e3 * once_given,
+         1e3 * eased_given);
+  CHECK(once > 2.4);
+  CHECK(eased <= LIMIT / 12.5 + 1e-9);
+  CHECK(eased_given <= 5e-5 + overdraft + 1e-9 && eased_given > 0.7 * once_given);
+}
+
 /* ---- the closed forms of the bench ---- */
 
 /* A hand against a wall whose spring falls to 1 / n of its force and stiffness, step by step. */
@@ -487,6 +545,38 @@ TEST(what_pulses_demand_is_what_a_stepped_hand_gives)
   CHECK_NEAR(late_demands(&rigid, &touch, 5.0, 0.1, 4), 5.0 + 2000.0 * 0.1 * 3e-3, 1e-12);
   CHECK_NEAR(late_demands(&rigid, &touch, 5.0, 0.1, 31), 5.0 + 2000.0 * 0.1 * 5e-3, 1e-12);
   CHECK(!late_hand_of("virtual:hand=relaxed,mass=1").known && !late_hand_of(NULL).known);
+}
+
+/* The rod hangs still: its surface is 0.02 m from its axis, the ball's radius is 0.01 m. */
+TEST(the_true_change_of_a_force_is_that_of_spring_and_damper)
+{
+  rig r;
+  rig_options options;
+  hap_detail detail;
+  late_bodies bodies = {.known = false};
+  rig_options_init(&options);
+  options.scene = "pendulum";
+  options.def.drive = HAP_DRIVE_LOCKSTEP;
+  REQUIRE(rig_create(&options, &r, &detail) >= HAP_OK);
+  REQUIRE(hap_session_start(r.session) >= HAP_OK);
+  const double way[5] = {-0.0305, -0.0295, -0.0293, -0.0290, -0.0290};
+  const int ticks[5] = {1, 1, 1, 3, 1};
+  const double k = r.scene->parameters.stiffness;
+  const double d = r.scene->parameters.damping;
+  late_true now[5];
+  for (int i = 0; i < 5; ++i) {
+    const double at[3] = {way[i], 0.0, -0.2};
+    const late_place place = {at, ticks[i], false};
+    now[i] = late_spring(r.scene, r.session, &place, &bodies);
+  }
+  CHECK(!now[0].known && now[1].known);
+  CHECK_NEAR(now[1].change, k * 0.0005 + d * 1.0, 1e-6); /* the damper is there at once */
+  CHECK_NEAR(now[1].most, k * 0.0005 + d * 1.0, 1e-6);
+  CHECK_NEAR(now[2].change, fabs(k * 0.0002 - d * 0.8), 1e-6);
+  CHECK_NEAR(now[3].change, fabs(k * 0.0003 - d * 0.1), 1e-6);
+  CHECK_NEAR(now[4].change, d * 0.1, 1e-6);
+  CHECK_NEAR(now[4].most, k * 0.001, 1e-6);
+  rig_destroy(&r);
 }
 
 TEST(where_nobody_watches_what_a_gap_held_back_comes_in_unpaid)
@@ -614,6 +704,31 @@ static void check_pulses(late_def def, int first, const late_pulse *pulses, int 
     CHECK(now.pulled <= 1.2 * still.pulled); /* by the strings, of a SPIDAR */
     CHECK(now.fault == HAP_FAULT_LATE || (now.fault == 0 && now.back_ms <= 200));
   }
+}
+
+/* A body that was thrown in slow motion meets a hand that rests: d v is there at once. */
+static void check_step(const char *name, int begin, late_pulse pulse)
+{
+  bench b = {.out = "."};
+  late_result now;
+  const late_def def = {.scene = name,
+                        .ticks = 2500,
+                        .begin = begin,
+                        .end = begin + 1000,
+                        .pulses = &pulse,
+                        .pulse_count = 1};
+  REQUIRE(late_run(&b, &def, &now) >= HAP_OK);
+  printf("# %s: largest step %.3g N, %u unexplained; %.3g N beyond the spring\n", name, now.step,
+         now.steps, now.beyond);
+  CHECK(now.steps == 0 && (!now.deep_known || now.beyond <= LATE_BEYOND_N));
+}
+
+TEST(no_step_is_felt_that_the_bodies_do_not_make)
+{
+  check_step("slide", 728, (late_pulse){8, 8});
+  check_step("lever", 1156, (late_pulse){25, 4});
+  check_step("roll", 300, (late_pulse){12, 4});
+  check_step("pendulum", 514, (late_pulse){3, 1});
 }
 
 TEST(a_loop_stopped_in_pulses_shakes_no_hand)

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "guard/energy_observer.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/safety.h"
@@ -45,8 +46,10 @@
  *
  * Nothing is done before the ledger is overdrawn by nearly 1 % of the largest energy that was
  * stored. Then the part of the force that goes with the hand is cut to what remains; what resists
- * it stays. While nothing is touched the ledger stands still, and a surplus is forgotten: it must
- * not pay for what a later touch makes of nothing.
+ * it stays. In a touch that a late loop has disturbed it is cut somewhat before that, as fast as
+ * forces of a late loop change, so that it is not one step. While nothing is touched the
+ * ledger stands still, and a surplus is forgotten: it must not pay for what a later touch makes of
+ * nothing.
  *
  * What is declared (pointer/declared.h) is no entry: neither is it paid for, nor held back. It has
  * limits of its own.
@@ -388,14 +391,41 @@ static double would_give(const hapi_pointer *p, const double force[3], const dou
 /* Leaves a share of the force's part along the motion, where it gives. */
 static void hold_back(hapi_pointer *p, double force[3], const double way[3], double share)
 {
-  if (would_give(p, force, way) > 0.0) {
+  if (share < 1.0 && would_give(p, force, way) > 0.0) {
     double along = hapi_v3_dot(force, way) / hapi_v3_dot(way, way);
     hapi_v3_madd(force, -(1.0 - share) * along, way, force);
     p->guard.flags |= HAP_GUARD_ENERGY;
   }
 }
 
-static void pay_no_more_than(const hapi_pointers *pointers, double budget)
+#define EASED_MOST 1000.0 /* ticks */
+
+/* N, most of a force along a way a tick that falls to zero by a rate a tick, and gives no more than
+ * a budget meanwhile. Over m ticks m f - rate m (m - 1) / 2 is budget / way. */
+static double eased_force(double budget, double way, double rate)
+{
+  double all = budget / way;
+  double ticks = 0.5 * (sqrt(1.0 + 8.0 * all / rate) - 1.0);
+  double m = 1.0 + (double)(int)hapi_min(ticks, EASED_MOST);
+  return all / m + 0.5 * rate * (m - 1.0);
+}
+
+/* 0..1, share of a pointer's force along its way that can still go down slowly before its part of
+ * the budget is spent. After a gap a debt may come in the middle of a press: taken at once when
+ * nothing is left, all of the force would be one step. What is taken earlier is only ever less. A
+ * spring that goes down faster by itself, as the hand draws back, sets the rate. */
+static double eased_share(const hapi_pointer *p, double period, double budget)
+{
+  const hapi_guard_pointer *g = &p->guard;
+  double way = hapi_v3_norm(g->moved);
+  double along = hapi_v3_dot(p->device.wrench.force, g->moved) / way;
+  double stiffness = g->change.explained.stiffness * p->device.motion_scale * p->device.force_scale;
+  double rate =
+      hapi_max(p->device.limits.max_force * period / HAPI_SAFETY_LATE_SLEW_S, stiffness * way);
+  return hapi_min(eased_force(budget / world_per_device(p), way, rate) / along, 1.0);
+}
+
+static void pay_no_more_than(const hapi_pointers *pointers, double budget, double eased_period)
 {
   double out = 0.0;
   double in = 0.0;
@@ -409,16 +439,21 @@ static void pay_no_more_than(const hapi_pointers *pointers, double budget)
     out += hapi_max(gives, 0.0) + hapi_max(turns, 0.0);
     in += hapi_max(-gives, 0.0) + hapi_max(-turns, 0.0);
   }
-  if (out - in <= hapi_max(budget, 0.0)) {
+  bool hard = out - in > hapi_max(budget, 0.0);
+  if (!hard && !(eased_period > 0.0 && out > 0.0)) {
     return;
   }
-  double share = hapi_min(hapi_max((budget + in) / out, 0.0), 1.0);
+  double share = hard ? hapi_min(hapi_max((budget + in) / out, 0.0), 1.0) : 1.0;
   for (uint32_t i = 0; i < pointers->high; ++i) {
     hapi_pointer *p = &pointers->of[i];
     if (p->generation == 0) {
       continue;
     }
-    hold_back(p, p->device.wrench.force, p->guard.moved, share);
+    double gives = would_give(p, p->device.wrench.force, p->guard.moved);
+    double eased = eased_period > 0.0 && gives > 0.0 && budget + in > 0.0
+                       ? eased_share(p, eased_period, (budget + in) * gives / out)
+                       : 1.0;
+    hold_back(p, p->device.wrench.force, p->guard.moved, hapi_min(share, eased));
     hold_back(p, p->device.wrench.torque, p->guard.turned, share);
   }
 }
@@ -488,6 +523,7 @@ void hapi_energy_observe(hapi_guard *guard, const hapi_tick_facts *facts,
   if (!settle_ports(guard, pointers, facts->now_ns)) {
     guard->balance = hapi_min(guard->balance, 0.0);
     guard->touch_s = 0.0;
+    guard->late.in_touch = false;
     pointers_may_press(guard, facts->period, pointers);
     return;
   }
@@ -506,5 +542,6 @@ void hapi_energy_observe(hapi_guard *guard, const hapi_tick_facts *facts,
         (guard->sprung - guard->balance) * hapi_min(facts->elapsed / HAPI_SAFETY_DEBT_S, 1.0);
   }
   pointers_may_press(guard, facts->period, pointers);
-  pay_no_more_than(pointers, guard->balance + overdraft);
+  pay_no_more_than(pointers, guard->balance + overdraft,
+                   guard->late.in_touch ? facts->period : 0.0);
 }

@@ -315,20 +315,29 @@ static void limit_slew(const hapi_guard *guard, double period, hapi_pointer *p)
                                         p->device.limits.max_torque / HAPI_SAFETY_FADE_S)
                              : p->device.limits.slew_torque;
   /* What a gap has changed is not felt at once, nor is what the energy observer gives back while
-   * there is less force. But a force that the world asks no more, as a contact has ended, and one
-   * that the energy observer takes, would be energy for the hand that draws back. */
-  double before = hapi_v3_dot(g->written.force, g->written.force);
-  bool falls = hapi_v3_dot(p->device.wrench.force, p->device.wrench.force) < before;
-  bool at_once = falls && ((g->flags & HAP_GUARD_ENERGY) != 0 ||
-                           hapi_v3_dot(g->wanted.force, g->wanted.force) < before);
-  bool late = guard->late.slew_s > 0.0 || g->late_loss > 0.0;
+   * there is less force. But the part of a force that the world asks no more, as the hand draws
+   * back or a contact has ended, and what the energy observer takes, would be energy for the hand.
+   * What late ticks take beyond comes slowly. */
+  double before = hapi_v3_norm(g->written.force);
+  double torque_before = hapi_v3_norm(g->written.torque);
+  bool falls = hapi_v3_norm(p->device.wrench.force) < before;
+  bool at_once = falls && (g->flags & HAP_GUARD_ENERGY) != 0;
+  bool late = guard->late.slew_s > 0.0 || g->late_loss > 0.0 ||
+              (guard->late.in_touch && g->change.held_back);
   if (!fault && late && !at_once) {
-    force_rate = hapi_min(force_rate, p->device.limits.max_force / HAPI_SAFETY_LATE_SLEW_S);
-    torque_rate = hapi_min(torque_rate, p->device.limits.max_torque / HAPI_SAFETY_LATE_SLEW_S);
+    double ends = falls ? before - hapi_v3_norm(g->wanted.force) : 0.0;
+    double torque_ends = falls ? torque_before - hapi_v3_norm(g->wanted.torque) : 0.0;
+    force_rate = hapi_min(
+        force_rate, hapi_max(p->device.limits.max_force / HAPI_SAFETY_LATE_SLEW_S, ends / period));
+    torque_rate = hapi_min(
+        torque_rate,
+        hapi_max(p->device.limits.max_torque / HAPI_SAFETY_LATE_SLEW_S, torque_ends / period));
   }
   bool force = vector_slew(g->written.force, period * force_rate, p->device.wrench.force);
   bool torque = vector_slew(g->written.torque, period * torque_rate, p->device.wrench.torque);
   p->guard.flags |= force || torque ? HAP_GUARD_SLEW : 0;
+  p->guard.change.held_back =
+      (g->flags & HAP_GUARD_ENERGY) != 0 || (g->change.held_back && (force || torque));
 }
 
 /* Of contacts, whatever took some of it meanwhile: the ledger of energy has a way of the device

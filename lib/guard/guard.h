@@ -34,6 +34,7 @@ typedef struct hapi_lateness {
   double slew_s;    /* for so long more after a long gap the force changes slowly */
   double fade_s;    /* after the fault: until the force is gone */
   double fade;      /* 0..1, share of the last force that this tick keeps of it */
+  bool in_touch;    /* a gap counted since something is felt without a break */
   uint64_t derated_ticks;
 } hapi_lateness;
 

@@ -68,6 +68,7 @@ static void lateness_note(hapi_lateness *late, double period, bool force)
   late->slew_s = hapi_max(late->slew_s - period, 0.0);
   if (lost > HAPI_SAFETY_LATE_GAP_S ||
       (lost > 0.5 * period && late->few_s > HAPI_SAFETY_LATE_FEW_S)) {
+    late->in_touch = true;
     late->slew_s = HAPI_SAFETY_LATE_SLEW_S;
     late->gap_s = hapi_max(late->gap_s, late->elapsed_s);
     late->hold_s = HAPI_SAFETY_LATE_HOLD_S;

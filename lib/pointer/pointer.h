@@ -188,6 +188,7 @@ typedef struct hapi_change_bound {
   double velocity[3];       /* m/s, of the device */
   double carried[3];        /* m/s, world: of its base */
   bool doubted;             /* the device */
+  bool held_back;           /* the energy observer took of the force: not all is back */
   hapi_explained explained; /* of this tick, and of the one before: */
   hapi_explained before;
   hap_wrench came;   /* of what is wanted: what the bound has let in */
