@@ -10,6 +10,7 @@
 #include <hapode/expert.h>
 #include <hapode/forces.h>
 
+#include "base/vec.h"
 #include "tests/desk.h"
 
 #define EXACT 1e-9 /* N */
@@ -716,7 +717,7 @@ typedef struct both_row {
 } both_row;
 
 /* A contact and a spring, each as stiff as the device holds, and a blow. */
-static void both_check(const both_row *row)
+static desk *both_make(const both_row *row)
 {
   char spec[256];
   hap_detail why = {""};
@@ -741,6 +742,19 @@ static void both_check(const both_row *row)
   spring.stiffness = 0.999 * row->stiffness;
   CHECK(hap_pointer_force_add(d->session, d->hand, &spring, &id) == HAP_OK);
   session_run(d->session);
+  return d;
+}
+
+static void both_end(desk *d)
+{
+  hap_session_destroy(d->session);
+  d->session = NULL;
+  hap_device_close(d->hand_def.device);
+}
+
+static void both_check(const both_row *row)
+{
+  desk *d = both_make(row);
   REQUIRE(hap_session_advance(d->session, 6000) >= HAP_OK);
   hap_pointer_state state = desk_state(d);
   double first = state.wrench.force[2];
@@ -750,9 +764,7 @@ static void both_check(const both_row *row)
     CHECK_NEAR(desk_state(d).wrench.force[2], first, 1e-3);
   }
   CHECK(session_stats(d->session).faults.count == 0);
-  hap_session_destroy(d->session);
-  d->session = NULL;
-  hap_device_close(d->hand_def.device);
+  both_end(d);
 }
 
 /* A hand brings the damping that twice the stiffness needs (docs/forces.md). */
@@ -764,6 +776,23 @@ TEST(a_hand_holds_a_contact_and_a_spring_that_the_device_holds_each)
                                   {"tense", 1e-3, 1066.0}};
   for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
     both_check(&rows[i]);
+  }
+}
+
+/* It swings in and out of the contact, and the spring goes on: the force follows the way by two
+ * slopes. */
+TEST(a_device_that_is_let_go_with_both_is_found_to_swing)
+{
+  static const both_row rows[] = {{"none", 0.0, 3200.0}, {"none", 1e-3, 1066.0}};
+  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+    desk *d = both_make(&rows[i]);
+    (void)hap_session_advance(d->session, 9000);
+    hap_stats stats = session_stats(d->session);
+    printf("# delay %g s: fault %u, %u ticks lowered\n", rows[i].delay, stats.faults.fault,
+           (unsigned)stats.safety.oscillation_ticks);
+    CHECK(stats.faults.fault == HAP_FAULT_OSCILLATION && stats.safety.oscillation_ticks > 0);
+    CHECK(hapi_v3_norm(desk_state(d).wrench.force) == 0.0);
+    both_end(d);
   }
 }
 

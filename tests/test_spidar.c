@@ -694,7 +694,7 @@ TEST(other_boards_behind_the_same_name_are_left_alone)
 
 /* ---- a whole session ---- */
 
-#define SAMPLES 200
+#define SAMPLES 100
 #define LEAST_N 2.0 /* that a sample is worth */
 
 typedef struct felt {
@@ -777,7 +777,7 @@ static hap_fault force_feel(rig *r, emulated *e, felt *seen)
 {
   hap_stats stats;
   hap_detail detail = {""};
-  double end = emulated_clock() + 60.0;
+  double end = emulated_clock() + 100.0;
   memset(seen, 0, sizeof *seen);
   do {
     emulated_sleep(5e-3);

@@ -106,17 +106,24 @@ static double fast_part(double slow[HAPI_SWING_STAGES], double value, double sha
   return value;
 }
 
+/* How the force follows the way in a tick. */
+typedef struct swing_tick {
+  double stiffness; /* the most in any tick: N/m, or N m/rad */
+  double acts;      /* 0..1, of it in this tick: a declared spring goes on beyond a contact */
+  double seconds;
+} swing_tick;
+
 /* The force that was on since the last tick goes with the way meanwhile. */
-static void axis_hear(hapi_swing_axis *s, double force, double way, double stiffness,
-                      double seconds)
+static void axis_hear(hapi_swing_axis *s, double force, double way, const swing_tick *tick)
 {
-  double share = hapi_min(seconds / HAPI_SAFETY_SWING_FAST_S, 1.0);
+  double share = hapi_min(tick->seconds / HAPI_SAFETY_SWING_FAST_S, 1.0);
   double step = way - s->way;
   sums_note(&s->now.fast, fast_part(s->slow_force, s->force, share),
             fast_part(s->slow_way, step, share));
   if (force != s->force) {
-    sums_note(&s->now.ticks, force - s->force, step);
-    s->now.felt += stiffness * step * step;
+    double sprung = tick->acts * step;
+    sums_note(&s->now.ticks, force - s->force, sprung);
+    s->now.felt += tick->stiffness * sprung * sprung;
   }
   s->work += s->force * step;
   s->force = force;
@@ -217,6 +224,15 @@ static double stiffness_felt(const hapi_pointer *p)
   return touched + held + p->declared.stiffness;
 }
 
+/* 0..1, of that stiffness: what acts in this tick. Where a device swings in and out of a contact
+ * while a declared spring goes on, the force follows the way by two slopes. Taken for one, that is
+ * a cosine of 0.95 at most. */
+static double share_acting(const hapi_pointer *p, double stiffness)
+{
+  bool touches = p->proxied || p->contacts > 0;
+  return touches || !(p->declared.stiffness > 0.0) ? 1.0 : p->declared.stiffness / stiffness;
+}
+
 /* N m/rad, likewise. touched: of what is touched with the hull. */
 static double turn_stiffness_felt(const hapi_pointer *p, double touched)
 {
@@ -242,11 +258,11 @@ static bool axes_follow(hapi_swings *swings, hapi_swing_axis axes[AXES], const d
 }
 
 static void axes_hear(hapi_swings *swings, hapi_swing_axis axes[AXES], const double force[3],
-                      const double way[3], double stiffness, double seconds)
+                      const double way[3], const swing_tick *tick)
 {
   for (int i = 0; i < AXES; ++i) {
     double before = axes[i].work;
-    axis_hear(&axes[i], force[i], way[i], stiffness, seconds);
+    axis_hear(&axes[i], force[i], way[i], tick);
     swings->work += axes[i].work - before;
   }
 }
@@ -258,17 +274,18 @@ static bool pointer_swings(hapi_pointer *p, const hap_wrench *felt, const double
   hapi_swings *s = &p->guard.swings;
   bool turns = (p->shape.hull != NULL && p->device.feels_torque) || hapi_grab_turns(&p->grab);
   double stiffness = stiffness_felt(p);
+  const swing_tick tick = {stiffness, share_acting(p, stiffness), seconds};
   double arm2 = p->shape.extent * p->shape.extent; /* no contact has a longer one */
   double way[3];                                   /* of the hand in its base */
   double spin[3];
   s->seconds += seconds;
   hapi_v3_sub(p->handle.position, p->frame.carried, way);
-  axes_hear(s, s->force, felt->force, way, stiffness, seconds);
+  axes_hear(s, s->force, felt->force, way, &tick);
   if (turns) {
     hapi_v3_sub(p->handle.spin, p->frame.carries.angular, spin);
     hapi_v3_madd(s->turned, seconds, spin, s->turned);
-    axes_hear(s, s->torque, felt->torque, s->turned, turn_stiffness_felt(p, arm2 * stiffness),
-              seconds);
+    const swing_tick turns_by = {turn_stiffness_felt(p, arm2 * stiffness), 1.0, seconds};
+    axes_hear(s, s->torque, felt->torque, s->turned, &turns_by);
   }
   if (p->device.jumped || (p->guard.flags & OTHER_REASONS) != 0) { /* the way is not the force's */
     for (int i = 0; i < AXES; ++i) {

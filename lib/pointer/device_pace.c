@@ -2,14 +2,16 @@
  * SPDX-License-Identifier: MIT */
 #include "pointer/device_pace.h"
 
+#include "base/assert.h"
 #include "base/safety.h"
 #include "base/vec.h"
 
 /* Of one or two the shorter, of eight the fourth. */
 static double pace_median(const hapi_device_pace *pace)
 {
-  double sorted[HAPI_DEVICE_PACE_GAPS];
+  double sorted[HAPI_DEVICE_PACE_GAPS] = {0.0};
   uint32_t count = pace->noted < HAPI_DEVICE_PACE_GAPS ? pace->noted : HAPI_DEVICE_PACE_GAPS;
+  HAPI_ASSERT(count > 0);
   for (uint32_t i = 0; i < count; ++i) {
     uint32_t at = i;
     for (; at > 0 && sorted[at - 1] > pace->gaps[i]; --at) {
