@@ -48,6 +48,7 @@ LAYERS = {
     "plugins/skeleton": [],
     "plugins/*": ["lib/base", "plugins/common"],
     "scenes": [],
+    "view": [],
     "examples": [],
     "tools": ["*"],
     "tools/conform": ["*"],
