@@ -119,6 +119,17 @@ static bool open_picture(const run_options *options, run_loop *loop, hap_detail 
   return loop->picture != NULL;
 }
 
+/* What draws no pictures is asked for wrongly. */
+static int open_shot(const run_options *options, run_loop *loop, hap_detail *detail)
+{
+  hap_status status =
+      run_shot_open(options, loop->rig, loop->seconds, loop->pointers, &loop->shot, detail);
+  if (status >= HAP_OK) {
+    return EXIT_GOOD;
+  }
+  return status == HAP_ERROR_UNSUPPORTED ? EXIT_USAGE : EXIT_FAILED;
+}
+
 static bool close_trace(run_loop *loop, hap_detail *detail)
 {
   FILE *file = loop->trace.file;
@@ -181,6 +192,10 @@ static int run_and_report(run_loop *loop, const run_recording *recording)
   if (!close_black_box(loop, &detail)) {
     code = usage_complain(EXIT_FAILED, detail.text);
   }
+  if (run_shot_close(loop->shot, &detail) < HAP_OK) {
+    code = usage_complain(EXIT_FAILED, detail.text);
+  }
+  loop->shot = NULL;
   if (picture_draw(loop, &detail) < HAP_OK) {
     code = usage_complain(EXIT_FAILED, detail.text);
   }
@@ -241,12 +256,17 @@ static int run_in(const run_options *options, rig *r, const run_recording *recor
                    .coupling = &coupling,
                    .pointers = pointers_of(r, recording)};
   run_progress_init(&loop.progress, options->rig.max_force > 0.0 ? options->rig.max_force : 20.0);
-  int code = EXIT_FAILED;
-  if (open_trace(options, &loop, &detail) && open_black_box(options, &loop, &detail) &&
-      open_picture(options, &loop, &detail)) {
+  int code = open_shot(options, &loop, &detail);
+  if (code == EXIT_GOOD &&
+      !(open_trace(options, &loop, &detail) && open_black_box(options, &loop, &detail) &&
+        open_picture(options, &loop, &detail))) {
+    code = EXIT_FAILED;
+  }
+  if (code == EXIT_GOOD) {
     code = run_and_report(&loop, recording);
   } else {
-    usage_complain(EXIT_FAILED, detail.text);
+    fprintf(stderr, "hapode-run: %s\n", detail.text);
+    run_shot_drop(loop.shot);
     (void)close_trace(&loop, &detail);
     (void)close_black_box(&loop, &detail);
   }

@@ -98,7 +98,8 @@ bool run_loop_stop_wanted(void)
 
 int32_t run_loop_trace_rows(const run_options *options)
 {
-  if (options->trace_path == NULL && options->plot_path == NULL) {
+  if (options->trace_path == NULL && options->plot_path == NULL && options->shot.path == NULL &&
+      options->shot.frames == NULL) {
     return 0;
   }
   return (int32_t)fmin(fmax(options->rig.def.haptic_hz, ROWS_MIN), ROWS_MAX);
@@ -129,13 +130,16 @@ static void trace_drain(run_loop *loop)
 {
   hap_trace_row rows[ROWS_AT_ONCE];
   size_t count = 0;
-  if (loop->trace.file == NULL && loop->picture == NULL) {
+  if (loop->trace.file == NULL && loop->picture == NULL && loop->shot == NULL) {
     return;
   }
   while (hap_session_trace_read(loop->rig->session, rows, ROWS_AT_ONCE, sizeof(hap_trace_row),
                                 &count) == HAP_OK) {
     for (size_t i = 0; i < count && loop->picture != NULL; ++i) {
       run_picture_add_row(loop->picture, &rows[i]);
+    }
+    for (size_t i = 0; i < count; ++i) {
+      run_shot_add_row(loop->shot, &rows[i]);
     }
     write_rows(loop, rows, count);
   }
@@ -200,6 +204,7 @@ static hap_status watch_look(watch *w, double t)
     return HAP_END;
   }
   (void)hap_session_stats(loop->rig->session, &stats, sizeof stats);
+  run_shot_look(loop->shot, t);
   run_coupling_look(loop->coupling, loop->rig);
   if (loop->picture != NULL && t >= w->next_sample) {
     run_picture_add_stats(loop->picture, t, &stats, 1.0 / run_summary_physics_hz(loop->options));

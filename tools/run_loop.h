@@ -9,6 +9,7 @@
 #include "tools/run_options.h"
 #include "tools/run_picture.h"
 #include "tools/run_progress.h"
+#include "tools/run_shot.h"
 #include "tools/trace_csv.h"
 
 typedef struct run_loop {
@@ -19,6 +20,7 @@ typedef struct run_loop {
   int trace_errno;      /* why it could not be written any more; 0: it could */
   FILE *black_box;      /* NULL: none wanted */
   run_picture *picture; /* NULL: none wanted */
+  run_shot *shot;       /* NULL: none wanted */
   run_progress progress;
   run_coupling *coupling; /* filled in on the way */
   size_t pointers;        /* of trace and picture */

@@ -120,6 +120,47 @@ static hap_status take_identity(run_options *options, const option *self, const 
   return HAP_OK;
 }
 
+/* Numbers with a separator between; false: there are others, or fewer. */
+static bool numbers_read(const char *value, char separator, size_t count, double *out)
+{
+  for (size_t i = 0; i < count; ++i) {
+    char *end = NULL;
+    out[i] = strtod(value, &end);
+    if (end == value || !isfinite(out[i]) || *end != (i + 1 < count ? separator : '\0')) {
+      return false;
+    }
+    value = end + 1;
+  }
+  return true;
+}
+
+static hap_status take_camera(run_options *options, const option *self, const char *value,
+                              hap_detail *detail)
+{
+  double *c = options->shot.camera;
+  (void)self;
+  options->shot.camera_given = numbers_read(value, ',', 6, c);
+  if (options->shot.camera_given && hypot(hypot(c[0] - c[3], c[1] - c[4]), c[2] - c[5]) > 1e-6) {
+    return HAP_OK;
+  }
+  return options_fail(detail, "\"%.60s\" is not x,y,z,tx,ty,tz: eye and what it looks at, m, apart",
+                      value);
+}
+
+static hap_status take_pixels(run_options *options, const option *self, const char *value,
+                              hap_detail *detail)
+{
+  double size[2];
+  bool good = numbers_read(value, 'x', 2, size);
+  for (int i = 0; i < 2 && good; ++i) {
+    good = size[i] >= self->low && size[i] <= self->high && size[i] == floor(size[i]);
+    options->shot.size[i] = good ? (int)size[i] : 0;
+  }
+  return good ? HAP_OK
+              : options_fail(detail, "\"%.60s\" is not WIDTHxHEIGHT, each %g to %g", value,
+                             self->low, self->high);
+}
+
 static hap_status take_effects(run_options *options, const option *self, const char *value,
                                hap_detail *detail)
 {
@@ -333,6 +374,18 @@ static const option table[] = {
      offsetof(run_options, trace_path), 0, 0},
     {"--plot", "FILE", "picture of the run as SVG, drawn by gnuplot", take_text,
      offsetof(run_options, plot_path), 0, 0},
+    {"--shot", "FILE", "picture of the scene as PNG, when the force is strongest; needs no display",
+     take_text, offsetof(run_options, shot.path), 0, 0},
+    {"--shot-at", "S", "the picture is of this time of the run", take_number,
+     offsetof(run_options, shot.at), 0, 86400},
+    {"--frames", "DIR", "such pictures 30 times a second, as frame_00000.png and so on", take_text,
+     offsetof(run_options, shot.frames), 0, 0},
+    {"--shot-size", "WxH", "pixels of these pictures (default 1280x720)", take_pixels, 0, 320,
+     8192},
+    {"--camera", "POINTS",
+     "of these pictures: x,y,z of the eye, then of what it looks at, m (default: all\n"
+     "that moves is in the picture)",
+     take_camera, 0, 0, 0},
     {"--black-box", "FILE", "after a fault, the last 256 ticks before it as a CSV file", take_text,
      offsetof(run_options, black_box_path), 0, 0},
     {"--record", "FILE", "all that enters the run, for --play (docs/recording.md)", take_text,
@@ -385,9 +438,14 @@ static hap_status fail_unknown(const char *argument, hap_detail *detail)
 /* What a recording does not answer. */
 static bool beside_play(const option *o)
 {
-  static const char *const names[] = {"--play", "--play-incomplete", "--seconds", "--trace",
-                                      "--plot", "--black-box",       "--list",    "--list-probe",
-                                      "--help", "--version"};
+  static const char *const names[] = {"--play",    "--play-incomplete",
+                                      "--seconds", "--trace",
+                                      "--plot",    "--black-box",
+                                      "--list",    "--list-probe",
+                                      "--shot",    "--shot-at",
+                                      "--frames",  "--shot-size",
+                                      "--camera",  "--help",
+                                      "--version"};
   bool found = false;
   for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
     found = found || strcmp(names[i], o->name) == 0;
@@ -501,6 +559,28 @@ static hap_status check_recording(const run_options *o, hap_detail *detail)
   return HAP_OK;
 }
 
+static hap_status check_shot(const run_options *o, hap_detail *detail)
+{
+  const run_shot_options *s = &o->shot;
+  bool alone = o->identify_path != NULL || o->calibrate_path != NULL || o->check.spec != NULL;
+  if (s->path == NULL && s->at >= 0.0) {
+    return options_fail(detail, "--shot-at: only with --shot");
+  }
+  if (s->path == NULL && s->frames == NULL) {
+    return s->camera_given ? options_fail(detail, "--camera: only with --shot or --frames")
+                           : HAP_OK;
+  }
+  if (texts_same(s->path, o->trace_path) || texts_same(s->path, o->plot_path) ||
+      texts_same(s->path, o->black_box_path) || texts_same(s->path, o->record_path) ||
+      texts_same(s->path, o->play_path)) {
+    return options_fail(detail, "--shot: the same file as that of another option");
+  }
+  return alone ? options_fail(detail,
+                              "--shot, --frames: not with --identify, --calibrate or "
+                              "--check-device, which show no scene")
+               : HAP_OK;
+}
+
 static hap_status check_calibrate(const run_options *o, hap_detail *detail)
 {
   if (o->calibrate_path == NULL) {
@@ -598,10 +678,10 @@ static hap_status options_check(run_options *o, hap_detail *detail)
     return options_fail(detail, "--identify: takes exactly one --device, there are %zu",
                         o->rig.device_count);
   }
-  if (check_calibrate(o, detail) < HAP_OK || check_error(o, detail) < HAP_OK ||
-      check_budget(o, detail) < HAP_OK || check_recording(o, detail) < HAP_OK ||
-      join_recording(o, detail) < HAP_OK || join_coupling(o, detail) < HAP_OK ||
-      join_friction(o, detail) < HAP_OK) {
+  if (check_shot(o, detail) < HAP_OK || check_calibrate(o, detail) < HAP_OK ||
+      check_error(o, detail) < HAP_OK || check_budget(o, detail) < HAP_OK ||
+      check_recording(o, detail) < HAP_OK || join_recording(o, detail) < HAP_OK ||
+      join_coupling(o, detail) < HAP_OK || join_friction(o, detail) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
   return run_effects_apply(&o->effects, def->model, &o->rig.expert, &why) < HAP_OK
@@ -616,6 +696,7 @@ hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail
   rig_options_init(&out->rig);
   out->model_age_s = -1.0;
   out->lookback = -1.0;
+  out->shot = (run_shot_options){.at = -1.0, .size = {1280, 720}};
   out->check.force = CONFORM_FORCE_DEFAULT;
   out->check.wait_s = 5.0;
   for (int at = 1; at < argc && status >= HAP_OK && out->action == RUN_SESSION; ++at) {

@@ -19,6 +19,16 @@ typedef enum run_action {
   RUN_VERSION
 } run_action;
 
+/* Pictures of the run. */
+typedef struct run_shot_options {
+  const char *path;   /* of --shot; NULL: none */
+  const char *frames; /* folder of --frames; NULL: none */
+  double at;          /* s, of --shot; negative: when the force is strongest */
+  int size[2];        /* px */
+  bool camera_given;
+  double camera[6]; /* m: eye, then what it looks at */
+} run_shot_options;
+
 typedef struct run_options {
   run_action action;
   rig_options rig;
@@ -30,6 +40,7 @@ typedef struct run_options {
   const char *trace_path;
   const char *plot_path;
   const char *black_box_path;
+  run_shot_options shot;
   const char *identify_path;  /* not NULL: identify the device, no session */
   const char *calibrate_path; /* not NULL: calibrate the device, no session */
   conform_options check;      /* spec not NULL: check that device, no session */
