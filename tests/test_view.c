@@ -415,6 +415,29 @@ TEST(without_a_camera_all_is_in_the_picture)
   }
 }
 
+TEST(moving_pictures_are_framed_calmly)
+{
+  hap_geom_def box;
+  box_init(&box);
+  easel *e = easel_make(&box, false);
+  double at[3][2];
+  view_destroy(e->view);
+  REQUIRE(view_create(WIDTH, HEIGHT, &e->view, NULL) == HAP_OK);
+  REQUIRE(view_take_scene(e->view, e->scene, NULL) == HAP_OK);
+  view_set_calm(e->view, 0.5);
+  easel_draw(e);
+  REQUIRE(view_project(e->view, e->bodies[0].position, at[0]));
+  e->bodies[0].position[0] += 0.05;
+  easel_draw(e); /* the body moves in the picture; the eye follows later */
+  REQUIRE(view_project(e->view, e->bodies[0].position, at[1]));
+  CHECK(at[1][0] > at[0][0] + 15);
+  for (int i = 0; i < 12; ++i) {
+    easel_draw(e);
+  }
+  REQUIRE(view_project(e->view, e->bodies[0].position, at[2]));
+  CHECK_NEAR(at[2][0], at[0][0], 1.0);
+}
+
 TEST(strips_show_what_came_in)
 {
   easel *e = easel_with_box();

@@ -17,6 +17,7 @@
 #include "view/view.h"
 
 #define FRAMES_HZ 30.0
+#define FRAMES_CALM 0.92 /* of the framing, from frame to frame */
 
 struct run_shot {
   const run_options *options;
@@ -281,6 +282,7 @@ static void frame_write(run_shot *shot)
   snprintf(path, sizeof path, "%.4000s/frame_%05zu.png", shot->options->shot.frames, shot->frames);
   ++shot->frames;
   FILE *file = picture_open("--frames", path, &why);
+  view_set_calm(shot->view, FRAMES_CALM);
   bool good = file != NULL && picture_write(shot, &shot->now, file, &why);
   if (file != NULL && fclose(file) != 0 && good) {
     snprintf(why.text, sizeof why.text, "cannot be written: %s", strerror(errno));
@@ -324,6 +326,7 @@ hap_status run_shot_close(run_shot *shot, hap_detail *detail)
     *detail = shot->failed;
   }
   if (shot->file != NULL) {
+    view_set_calm(shot->view, 0.0);
     bool written = picture_write(shot, &shot->kept, shot->file, &why);
     if (fclose(shot->file) != 0 && written) {
       snprintf(why.text, sizeof why.text, "cannot be written: %s", strerror(errno));

@@ -31,6 +31,8 @@ struct view {
   things things;
   view_camera camera;
   bool camera_given;
+  bool framed; /* there was a picture */
+  float calm;  /* share of the last framing that is kept */
   ink ink;
   uint8_t *pixels;
 };
@@ -118,6 +120,11 @@ void view_set_camera(view *v, const double eye[3], const double target[3])
   v->camera_given = true;
 }
 
+void view_set_calm(view *v, double share)
+{
+  v->calm = (float)share;
+}
+
 /* ---- drawing ---- */
 
 static float view_aspect(const view *v)
@@ -134,6 +141,13 @@ static float grid_cell(float size)
   return decade * (share < 2.0F ? 1.0F : share < 5.0F ? 2.0F : 5.0F);
 }
 
+static void vector_blend(const float old[3], float share, float io[3])
+{
+  for (int i = 0; i < 3; ++i) {
+    io[i] += share * (old[i] - io[i]);
+  }
+}
+
 static void camera_place(view *v, const view_frame *frame, bool strips)
 {
   view_camera given = v->camera;
@@ -143,6 +157,13 @@ static void camera_place(view *v, const view_frame *frame, bool strips)
   v->camera.up_share = below - above;
   v->camera.free_share = 1.0F - below - above;
   camera_frame(&v->camera, v->things.balls, count, view_aspect(v));
+  if (v->framed && !v->camera_given && v->calm > 0.0F) {
+    vector_blend(given.eye, v->calm, v->camera.eye);
+    vector_blend(given.target, v->calm, v->camera.target);
+    v->camera.size += v->calm * (given.size - v->camera.size);
+    camera_look(&v->camera, view_aspect(v));
+  }
+  v->framed = true;
   if (v->camera_given) {
     memcpy(v->camera.eye, given.eye, sizeof given.eye);
     memcpy(v->camera.target, given.target, sizeof given.target);

@@ -75,6 +75,10 @@ hap_status view_take_scene(view *v, const hap_scene *scene, hap_detail *detail);
 /* Where the eye is and what it looks at, m, world. Before: the view frames what moves by itself. */
 void view_set_camera(view *v, const double eye[3], const double target[3]);
 
+/* For moving pictures: share of the last picture's framing that the next ones keep, 0 (default) to
+ * 1, so that the eye follows calmly. Without effect after view_set_camera. */
+void view_set_calm(view *v, double share);
+
 /* Draws a picture; strips and labels may be NULL. Of the pixels the view's: rows from the top, 3
  * bytes each. Until the next call. */
 const uint8_t *view_draw(view *v, const view_frame *frame, const view_strips *strips,
