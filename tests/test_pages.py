@@ -16,9 +16,10 @@ CODE = re.compile(r"^```(\w*)\n(.*?)^```$", re.S | re.M)
 # Words of a page that are a file or a folder of the tree.
 PATH = re.compile(r"`((?:docs|lib(?!/udev)|include|tests|tools|bench|scenes|plugins|examples)/"
                   r"[\w./*-]+)`")
-# Words of a command that calls for hardware, for a file of another one, or for a clock.
+# Words of a command that calls for hardware, for a driver, for a file of another one, or for a
+# clock.
 NEEDS_MORE = ("spidar", "module:", "replay:", "/", "--play", "--identity", "--record",
-              "--tick-share", "--physics-share", "--reconnect")
+              "--tick-share", "--physics-share", "--reconnect", "--shot", "--frames")
 # What a piece of code may use; a whole program has a main of its own.
 BEFORE = """#include <hapode/hapode.h>
 #include <hapode/ode.h>
