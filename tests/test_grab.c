@@ -740,6 +740,47 @@ TEST(what_a_driven_handle_gives_is_felt)
   CHECK(session_stats(d->session).faults.fault == HAP_FAULT_NONE);
 }
 
+/* A handle goes to and fro at 8 Hz, ahead of the hand. Its drive gives the hand k pi A^2 sin(1) a
+ * round, and the force is that of the spring in the middle of the tick in which it is held. */
+TEST(what_a_fast_handle_gives_is_felt_whole)
+{
+  const double w = 2.0 * M_PI * 8.0; /* 1/s */
+  const double far = 0.01;
+  desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+  dBodyID body = box_add(d, 1.0);
+  dBodySetKinematic(body);
+  d->def.physics_hz = 1000.0;
+  d->hand_def.max_force = 30.0;
+  desk_run(d, 0.0, 0.0, 0.5);
+  desk_hold(d, body, NULL);
+  desk_wait(d, 50);
+  double work = 0.0;
+  double worst = 0.0;
+  uint64_t begun = 0;
+  for (int k = 1; k <= 2000; ++k) {
+    double t = T * k;
+    REQUIRE(hap_session_lock(d->session) == HAP_OK);
+    dBodySetLinearVel(body, far * (sin(w * t) - sin(w * (t - T))) / T, 0.0, 0.0);
+    hap_session_unlock(d->session);
+    d->at[0] = far * (sin(w * t - 1.0) + sin(1.0));
+    d->velocity[0] = far * w * cos(w * t - 1.0);
+    hand_lead(d);
+    REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
+    double force = desk_state(d).wrench.force[0];
+    double next = far * (sin(w * (t + T) - 1.0) + sin(1.0));
+    double middle = t + 0.5 * T;
+    double right = 1000.0 * far * (sin(w * middle) - sin(w * middle - 1.0) - sin(1.0));
+    work += force * (next - d->at[0]);
+    worst = k > 100 ? fmax(worst, fabs(force - right)) : 0.0; /* the hand begins at full speed */
+    begun = k == 100 ? session_stats(d->session).faults.energy_ticks : begun;
+  }
+  hap_stats stats = session_stats(d->session);
+  printf("# %.4g J, %.3g N off\n", work, worst);
+  CHECK_NEAR(work, 16.0 * 1000.0 * M_PI * far * far * sin(1.0), 0.02);
+  CHECK(worst < 0.03);
+  CHECK(stats.faults.energy_ticks == begun && stats.faults.fault == HAP_FAULT_NONE);
+}
+
 /* ---- ticks that are missed ---- */
 
 typedef struct gap_row {
@@ -783,8 +824,8 @@ static const gap_row gaps[] = {{"a_spring_is_stretched_slowly_after_one_gap_of_9
                                {"a_spring_is_stretched_at_once_after_gaps_of_4", 200, 4},
                                {"a_spring_is_stretched_slowly_after_40_of_80", 40, 40}};
 
-/* A hand draws at a handle that stays, and turns it: force and torque are those of the springs, but
- * for the way of the gaps, which comes in at 0.5 m/s and 5 rad/s. */
+/* A hand draws at a handle that stays, and turns it: force and torque are those of the springs in
+ * the middle of a tick, but for the way of the gaps, which comes in at 0.5 m/s and 5 rad/s. */
 TEST_EACH(gaps, const gap_row *row)
 {
   const double speed = 0.2;   /* m/s */
@@ -823,8 +864,8 @@ TEST_EACH(gaps, const gap_row *row)
       held_back = fmax(held_back, late);
       const hap_wrench felt = desk_state(d).wrench;
       double left = 1.0 - law.loss;
-      double force = -1000.0 * (pose.position[0] - late) * left;
-      double torque = -torsion * 2.0 * sin(turn - 0.5 * late_turn) * left;
+      double force = -1000.0 * (pose.position[0] + 0.5 * speed * T - late) * left;
+      double torque = -torsion * (2.0 * sin(turn - 0.5 * late_turn) + 0.5 * spin * T) * left;
       worst = fmax(worst, fabs(felt.force[0] - force));
       worst_turn = fmax(worst_turn, fabs(felt.torque[0] - torque));
     }

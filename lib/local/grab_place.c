@@ -238,7 +238,9 @@ static double damping_of(double asked, double most, double stiffness, double ine
   return fmin(or_else(asked, sqrt(stiffness * inertia)), most);
 }
 
-static void pull_stiffen(hapi_pointer *p, const hapi_local_body *body)
+/* A driven body has a damping of k T / 2. This makes the force that of the middle of the tick in
+ * which it is held. An undamped spring gives k (v T)^2 / 2 too much in each tick. */
+static void pull_stiffen(hapi_pointer *p, const hapi_local_body *body, double period)
 {
   hapi_grab *g = &p->grab;
   hapi_grab_pull *pull = &g->pull;
@@ -247,12 +249,16 @@ static void pull_stiffen(hapi_pointer *p, const hapi_local_body *body)
   double arm = HAPI_GRIP_ARM * p->device.motion_scale;
   bool driven = (body->flags & HAPI_BODY_DRIVEN) != 0;
   bool turns = setup->turns == HAP_GRAB_TURNS && p->device.turns && p->device.feels_torque;
-  double mass = driven ? 0.0 : fmax(body->given.mass, body->given.held_mass);
-  double inertia =
-      driven ? 0.0 : (i[0] + i[4] + i[8]) / 3.0 + mass * hapi_v3_dot(g->hold.place, g->hold.place);
+  double mass = fmax(body->given.mass, body->given.held_mass);
+  double inertia = (i[0] + i[4] + i[8]) / 3.0 + mass * hapi_v3_dot(g->hold.place, g->hold.place);
   pull->stiffness = or_else(setup->stiffness, stiffness_rigid(p));
-  pull->damping = damping_of(setup->damping, setup->damping_most, pull->stiffness, mass);
   pull->turn_stiffness = turns ? or_else(setup->turn_stiffness, arm * arm * pull->stiffness) : 0.0;
+  double half = 0.5 * period;
+  if (driven) {
+    mass = half * half * pull->stiffness;
+    inertia = half * half * pull->turn_stiffness;
+  }
+  pull->damping = damping_of(setup->damping, setup->damping_most, pull->stiffness, mass);
   pull->turn_damping = turns ? damping_of(setup->turn_damping, arm * arm * setup->damping_most,
                                           pull->turn_stiffness, inertia)
                              : 0.0;
@@ -296,7 +302,7 @@ static void grab_place(hapi_pointer *p, const hapi_local_body *body, const hapi_
   } else if (p->device.stood > 0.0 && !p->proxied) {
     place_catch_up(hold, p, body);
   }
-  pull_stiffen(p, body);
+  pull_stiffen(p, body, facts->period);
   place_measure(hold, p, body, pull->way, pull->turn);
   pull_bound(p);
   double before = pull_energy(pull);
