@@ -466,6 +466,73 @@ TEST(the_power_of_a_force_is_bounded_and_no_medium_gives_any)
   CHECK(most <= 6e-3); /* 0.5 mJ, and as much each 0.1 s; without a bound 0.09 J */
 }
 
+/* Where nobody promises less, a force gives what it would give at 1 m/s and at 10 rad/s: 2 W and 1 W
+ * here, and what they come to in 0.1 s at once. The hand goes three times as fast. */
+TEST(without_a_promise_the_power_is_that_of_a_slow_hand)
+{
+  for (int turns = 0; turns < 2; ++turns) {
+    desk *d = desk_in_air(0.0, 0.0, 0.0);
+    hap_force_def def = force_of(HAP_FORCE_CONSTANT);
+    const double rate = turns ? 30.0 : 3.0;
+    double joules = 0.0;
+    (turns ? def.torque : def.force)[0] = turns ? 0.1 : 2.0;
+    (void)force_add(d, &def);
+    for (int i = 0; i < 500; ++i) {
+      double x = rate * T * i;
+      hap_pose pose = {{turns ? 0.0 : x, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+      hap_twist twist = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+      pose.quat_wxyz[0] = turns ? cos(0.5 * x) : 1.0;
+      pose.quat_wxyz[1] = turns ? sin(0.5 * x) : 0.0;
+      (turns ? twist.angular : twist.linear)[0] = rate;
+      REQUIRE(hap_pointer_set_target(d->session, d->hand, &pose, &twist) == HAP_OK);
+      REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
+      hap_wrench felt = desk_state(d).wrench;
+      joules += rate * T * (turns ? felt.torque : felt.force)[0];
+    }
+    double power = turns ? 10.0 * 0.1 : 1.0 * 2.0;
+    CHECK_NEAR(joules, power * (0.5 + 0.1), 0.02 * power);
+    tap_release(d);
+  }
+}
+
+/* A medium that may give nothing gave by mistake, as its velocity was old. The debt counts against
+ * its largest force on 0.1 mm: half of that leaves half of the force, and is forgiven in 0.1 s. */
+TEST(a_debt_of_half_the_force_on_a_tenth_of_a_millimetre_leaves_half)
+{
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
+  hap_force_def medium = force_of(HAP_FORCE_VISCOUS);
+  const double *old = HERE(-0.5, 0.0, 0.0);
+  medium.damping = 10.0;
+  medium.max_force = 5.0;
+  (void)force_add(d, &medium);
+  CHECK_NEAR(felt_at(d, STILL, old).force[0], 5.0, EXACT);
+  (void)felt_at(d, HERE(5e-5, 0.0, 0.0), old);
+  double debt = 0.5 * (1.0 - T / 0.1);
+  CHECK_NEAR(felt_at(d, HERE(5e-5, 0.0, 0.0), old).force[0], 5.0 * (1.0 - debt), 1e-6);
+  debt *= 1.0 - T / 0.1;
+  CHECK_NEAR(felt_at(d, HERE(5e-5, 0.0, 0.0), old).force[0], 5.0 * (1.0 - debt), 1e-6);
+}
+
+/* In a medium as thick as can be, the lightest device that does not tell its mass comes to rest
+ * in 10 ms. It never turns round, as with more damping it would swing from tick to tick. */
+TEST(a_light_device_comes_to_rest_in_the_thickest_medium)
+{
+  const double mass = 0.05;
+  desk *d = desk_in_air(0.0, 0.0, 0.0);
+  hap_force_def medium = force_of(HAP_FORCE_VISCOUS);
+  hap_force_id id;
+  double at[3] = {0.0, 0.0, 0.0};
+  double velocity[3] = {0.1, 0.0, 0.0};
+  medium.damping = 1e4;
+  CHECK(hap_pointer_force_add(d->session, d->hand, &medium, &id) == HAP_SATURATED);
+  for (int i = 0; i < 10; ++i) {
+    velocity[0] += T / mass * felt_at(d, at, velocity).force[0];
+    at[0] += T * velocity[0];
+    CHECK(velocity[0] > -1e-9);
+  }
+  CHECK(velocity[0] < 0.005);
+}
+
 /* ---- what is refused ---- */
 
 typedef struct wrong_row {

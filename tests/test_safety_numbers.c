@@ -12,11 +12,33 @@
 #include "guard/force_guard.h"
 #include "haptic/haptic_internal.h"
 #include "local/contact_ramp.h"
+#include "local/grab_place.h"
 #include "plugins/spidar/belief.h"
 #include "plugins/spidar/calibration.h"
 #include "pointer/coupling.h"
 #include "pointer/plausible.h"
 #include "tests/tick_world.h"
+
+/* ---- grips ---- */
+
+TEST(a_grip_waits_a_second_for_a_body_that_does_not_come)
+{
+  static hapi_pointer hands[1];
+  static const hapi_bodies nobody;
+  static const hapi_touches none;
+  hapi_pointers pointers = {.of = hands, .high = 1};
+  const hapi_tick_facts facts = {.model = HAP_MODEL_CONTACT, .period = 1e-3};
+  int ticks = 0;
+  hands[0] = (hapi_pointer){.generation = 1};
+  hands[0].grab.any = true;
+  hands[0].grab.wanted = (hapi_grab_setup){.birth = 7, .serial = 1};
+  do {
+    hapi_grabs_place(&pointers, &nobody, &none, &facts);
+    ticks += hands[0].grab.phase == HAPI_GRAB_WAITS;
+  } while (hands[0].grab.phase == HAPI_GRAB_WAITS && ticks < 100000);
+  CHECK_NEAR(1e-3 * ticks, 1.0, 2e-3);
+  CHECK(hands[0].grab.ended == HAP_GRAB_GONE);
+}
 
 /* ---- contacts that arrive deep ---- */
 
