@@ -466,8 +466,8 @@ TEST(the_power_of_a_force_is_bounded_and_no_medium_gives_any)
   CHECK(most <= 6e-3); /* 0.5 mJ, and as much each 0.1 s; without a bound 0.09 J */
 }
 
-/* Where nobody promises less, a force gives what it would give at 1 m/s and at 10 rad/s: 2 W and 1 W
- * here, and what they come to in 0.1 s at once. The hand goes three times as fast. */
+/* Where nobody promises less, a force gives what it would give at 1 m/s and at 10 rad/s: 2 W and
+ * 1 W here, and what they come to in 0.1 s at once. The hand goes three times as fast. */
 TEST(without_a_promise_the_power_is_that_of_a_slow_hand)
 {
   for (int turns = 0; turns < 2; ++turns) {
