@@ -445,6 +445,29 @@ TEST(a_light_body_answers_to_three_tenths_of_its_mass_in_a_tick)
   CHECK_NEAR(desk_state(d).wrench.force[0], -0.3 * mass / (T * T) * 0.002, 1e-3);
 }
 
+/* 1 kN/m on 0.1 g would turn the way about ten times in a tick, and swing up. */
+TEST(a_light_body_bounds_a_spring_in_single_too)
+{
+  desk *d = desk_new(0.0, HAP_MODEL_SINGLE);
+  dBodyID ball = ode_ball(d->world, d->space, 1e-4, 0.01, (const double[3]){0.0, 0.0, 0.0});
+  d->hand_def.collide_bits = 0;
+  desk_run(d, 0.01, 0.0, 0.0);
+  desk_wait(d, 60);
+  hap_force_def def = bound_def(HAP_FORCE_SPRING, ball);
+  def.stiffness = 1000.0;
+  (void)force_add(d, &def);
+  double most = 0.0;
+  double first = 0.0;
+  for (int k = 0; k < 2000; ++k) {
+    desk_wait(d, 1);
+    double force = fabs(desk_state(d).wrench.force[0]);
+    first = first == 0.0 ? force : first;
+    most = fmax(most, force);
+  }
+  CHECK_NEAR(first, 0.3 / 10.0 * 1000.0 * 0.01, EXACT);
+  CHECK_SAY(most < 1.1 * first, "%g N", most);
+}
+
 /* ---- what is refused ---- */
 
 TEST(wrong_bonds_are_refused)

@@ -6,6 +6,7 @@
 #include "tests/tap.h"
 
 #include <hapode/hapode.h>
+#include <hapode/hooks.h>
 #include <hapode/ode.h>
 
 #include "tests/surface_world.h"
@@ -186,6 +187,70 @@ TEST(a_light_body_bounds_the_pull)
   CHECK(w->force[2] == 0.0);
   cw_go(w, 0.0, 0.0, -1.5, 1);
   CHECK_NEAR(w->force[2], -20.0 * PEAK * u * (1.0 - u * u) * 0.3 / steep, 1e-6);
+}
+
+static int steep_lines;
+
+static void steep_count(hap_log_level level, const char *text, void *user)
+{
+  (void)user;
+  steep_lines += level >= HAP_LOG_WARNING && strstr(text, "than the device can hold") != NULL;
+}
+
+typedef struct hold_row {
+  const char *name;
+  const char *device;
+  hap_coupling coupling;
+  double holds; /* N/m */
+  int lines;
+} hold_row;
+
+static const hold_row holds[] = {
+    {"a_rated_device_bounds_the_pull", ",rated_stiffness=2000", HAP_COUPLING_DIRECT, 2000.0, 1},
+    {"behind_a_proxy_a_little_more", ",rated_stiffness=2000", HAP_COUPLING_PROXY, 1800.0, 1},
+    {"damping_bounds_the_pull", ",device_damping=1", HAP_COUPLING_DIRECT, 1600.0, 1},
+    {"of_an_unknown_device_the_contacts_do", "", HAP_COUPLING_DIRECT, STIFFNESS, 1},
+    {"what_it_holds_is_whole", ",rated_stiffness=40000", HAP_COUPLING_DIRECT, 17320.508, 0},
+};
+
+/* 20 N on 3 mm are 17 kN/m at the surface: what is felt is as steep as the device holds. */
+TEST_EACH(holds, const hold_row *row)
+{
+  contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+  char spec[128];
+  hap_hooks hooks;
+  hap_detail why = {""};
+  hap_pointer_state state;
+  (void)snprintf(spec, sizeof spec, "virtual:path=0:0/0/%g;9:0/0/%g,hand=rigid,max_force=30%s",
+                 RADIUS + 0.001, RADIUS + 0.001, row->device);
+  hap_hooks_init(&hooks, sizeof hooks);
+  hooks.log = steep_count;
+  steep_lines = 0;
+  REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
+  told.says.magnet_force = 20.0;
+  told.says.magnet_reach = 0.003;
+  cw_add_floor(w);
+  (void)dCreatePlane(w->space, 0.0, 1.0, 0.0, -RADIUS - 0.02); /* a second one is not told */
+  w->hand_expert.coupling = row->coupling;
+  w->hand_def.max_force = 30.0;
+  w->ode.user = w;
+  w->ode.world = w->world;
+  w->ode.space = w->space;
+  hap_device *device = NULL;
+  REQUIRE(hap_device_open(spec, &device, &why) == HAP_OK);
+  w->hand_def.device = device;
+  REQUIRE(hap_session_create(&w->def, &w->ode, &w->session, &why) == HAP_OK);
+  REQUIRE(hap_pointer_add(w->session, &w->hand_def, &w->hand) == HAP_OK);
+  REQUIRE(hap_session_start(w->session) == HAP_OK);
+  REQUIRE(hap_session_advance(w->session, 300) >= HAP_OK);
+  REQUIRE(hap_pointer_get(w->session, w->hand, &state, sizeof state) >= HAP_OK);
+  CHECK_NEAR(state.wrench.force[2], -row->holds * 0.001 * (1.0 - 1.0 / 9.0), 1e-5);
+  CHECK(steep_lines == row->lines);
+  CHECK(((state.guard & HAP_GUARD_OWN) != 0) == (row->lines > 0));
+  CHECK(hap_hooks_set(NULL) == HAP_OK);
+  hap_session_destroy(w->session);
+  w->session = NULL;
+  hap_device_close(device);
 }
 
 /* Their bodies do not move in the loop, so nothing pulls at them. */

@@ -45,7 +45,8 @@ typedef struct hap_surface {
   /* N, 0..100: the surface pulls the pointer to its nearest point, from magnet_reach above it on,
    * with this force at 0.58 of the reach, and with none where the two meet: as HAP_FORCE_MAGNET,
    * declared as that is. The body gets the opposite force, in models CONTACT and SINGLE; in the
-   * others bodies that move do not pull. 0, as it comes: none. */
+   * others bodies that move do not pull. Where that is steeper, at the surface, than the device can
+   * hold, less is felt, and the log says so once. 0, as it comes: none. */
   double magnet_force;
   double magnet_reach; /* m, 0.001..hap_ode_def.magnet_reach; comes with that */
 } hap_surface;

@@ -7,6 +7,9 @@
 
 #include <hapode/forces.h>
 
+#define HAPI_MAGNET_PEAK \
+  2.598076211353316 /* 1 / (u (1 - u^2)) where that is greatest: 3 sqrt(3) / 2 */
+
 typedef struct hapi_wave_setup {
   uint32_t restart;
   uint32_t sample_count; /* 0: a sine */

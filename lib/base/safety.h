@@ -95,6 +95,7 @@
 #define HAPI_SAFETY_OWN_MASS 0.05   /* kg */
 #define HAPI_SAFETY_OWN_DAMPING 0.5 /* 1 */
 #define HAPI_SAFETY_OWN_ANSWER 0.3  /* 1 */
+#define HAPI_SAFETY_MAGNET_LAG 0.9  /* 1 */
 #define HAPI_SAFETY_CALL_SHARE 0.1  /* 1 */
 #define HAPI_SAFETY_CALL_LATE 2.5   /* 1 */
 #define HAPI_SAFETY_CALL_FORGET 0.5 /* 1/s */

@@ -9,6 +9,7 @@
 #include <hapode/surface.h>
 
 #include "base/alloc.h"
+#include "base/force_setup.h"
 #include "base/pointer_id.h"
 #include "base/pose.h"
 #include "base/safety.h"
@@ -122,8 +123,20 @@ static void feel_read(const hap_surface *s, const hapi_state_pointer *pointer, h
   }
 }
 
+/* The loop cuts it, as the device may change its scales. */
+static void magnet_say(hapi_nearby *nearby, const hapi_state_pointer *pointer,
+                       const hapi_feel *feel)
+{
+  if ((feel->more & HAPI_FEEL_MAGNET) != 0 &&
+      HAPI_MAGNET_PEAK * feel->magnet_force > pointer->magnet_hold * feel->magnet_reach) {
+    hapi_say_once(nearby->cycle, &nearby->neighbors.feels.said_steep,
+                  "a surface pulls a pointer with a force that changes more with the way than the "
+                  "device can hold: the pull is cut (hapode/surface.h, magnet_reach)");
+  }
+}
+
 /* False: the answer was not good. */
-static bool feel_ask(const hapi_nearby *nearby, uint32_t index, dGeomID geom, hapi_known_feel *out)
+static bool feel_ask(hapi_nearby *nearby, uint32_t index, dGeomID geom, hapi_known_feel *out)
 {
   const hapi_state_pointer *pointer = &hapi_state_pointers(nearby->cycle->state)[index];
   const hap_ode_def *ode = &nearby->world->ode;
@@ -142,6 +155,7 @@ static bool feel_ask(const hapi_nearby *nearby, uint32_t index, dGeomID geom, ha
   }
   out->touchable = surface.touchable != 0;
   feel_read(&surface, pointer, &out->feel);
+  magnet_say(nearby, pointer, &out->feel);
   out->reach = fmax(out->feel.magnet_reach,
                     (out->feel.more & HAPI_FEEL_ADHESION) != 0 ? HAPI_SAFETY_ADHESION_WAY : 0.0);
   if (texture != NULL) {

@@ -39,6 +39,7 @@ typedef struct hapi_feels {
   double reach; /* m, the largest of the pairs near at the last step, within which all are asked */
   double reach_now; /* the same of this step, up to now */
   bool said_crowded;
+  bool said_steep;
 } hapi_feels;
 
 void hapi_feels_finish(hapi_feels *feels);

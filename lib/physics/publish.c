@@ -206,7 +206,7 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, ha
       hapi_v3_copy(of->falls, out->b); /* over the age of the model, when it comes in */
     }
   }
-  if (slot->held) {
+  if (slot->held || p->cycle->model == HAP_MODEL_SINGLE) { /* forces may be bound to it */
     out->held_mass = fill_inertia(body, out);
   }
   body_scale(p->cycle->time_scale, out);

@@ -5,19 +5,27 @@
 
 /* What an own force is at a place, a velocity and a time. */
 
+#include <math.h>
 #include <stdbool.h>
 
 #include "base/force_setup.h"
+#include "base/safety.h"
 #include "pointer/pointer.h"
-
-#define HAPI_MAGNET_PEAK \
-  2.598076211353316 /* 1 / (u (1 - u^2)) where that is greatest: 3 sqrt(3) / 2 */
 
 /* 1/m: what of a magnet's strength acts for each metre of the way to it. */
 static inline double hapi_magnet_share(double way2, double range)
 {
   double u2 = way2 / (range * range);
   return u2 < 1.0 ? HAPI_MAGNET_PEAK * (1.0 - u2) / range : 0.0;
+}
+
+/* N/m, of the pull of a surface: what the device holds; where nobody knows, what was chosen for
+ * contacts. HUGE_VAL: there is no device. */
+static inline double hapi_magnet_hold(const hapi_pointer *p)
+{
+  double held = p->coupling.own.stiffness;
+  bool chosen = !p->coupling.hold_known && held < HUGE_VAL;
+  return chosen ? p->surface.stiffness : p->proxied ? HAPI_SAFETY_MAGNET_LAG * held : held;
 }
 
 /* A body to which a force is bound: its frame, and how that moves. */

@@ -156,7 +156,7 @@ typedef struct hapi_model_body {
   double impulse_taken[6]; /* of hapi_state_body.impulse and .angular_impulse: in the twist above */
 
   uint64_t birth;   /* of the body: no other has ever the same */
-  double held_mass; /* kg, of one that a pointer holds, in any model; else 0 */
+  double held_mass; /* kg, of one that a pointer holds or pulls, also beside CONTACT; else 0 */
   hapi_tag tag;     /* NULL: a body of the session itself */
   uint32_t course;  /* of a driven one: 1 + index into the model's courses; 0: by its twist */
 

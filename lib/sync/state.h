@@ -17,6 +17,7 @@ typedef struct hapi_state_pointer {
   double damping;
   double friction;
   double finger_radius;
+  double magnet_hold; /* N/m: a surface that pulls more steeply is cut */
   hap_pose pose;
   hap_twist twist;
   uint32_t is_tool;     /* a hull: see hapi_state_hulls */

@@ -7,8 +7,8 @@
 #include "base/assert.h"
 #include "base/safety.h"
 #include "base/vec.h"
-#include "local/rows.h"
 #include "pointer/own_force.h"
+#include "tick/own_hold.h"
 
 #define SCALE_ROUNDING 1e-9
 
@@ -115,36 +115,16 @@ static const hapi_local_body *bond_follow(hapi_own_force *own, const hapi_bodies
   return body;
 }
 
-/* Two things bound a spring or damper to a body. What a light body cannot hold is cut, for hand and
- * body.
- *
- * The body answers to a force in the next tick: that is stable as long as the answer does not turn
- * the way about, k dt^2 + 2 d dt within the mass that the force meets.
- *
- * The device answers late. A spring k that comes late by a gives k a w v to a hand of the velocity
- * v, where w is how fast the hand leaves the body; what the device holds is the k at which its
- * damping takes that for w = v. Free bodies swing against each other with w = v (1 + M / m): the
- * device of mass M holds so much less. A damper likewise. */
+/* What hand and body can hold of it. */
 static double bond_share(const hapi_own_force *own, const hapi_local_body *body,
-                         const hapi_pointer *p, const hap_wrench *wrench, double period)
+                         const hapi_pointer *p, const hapi_tick_facts *facts,
+                         const hap_wrench *wrench)
 {
-  const hapi_pointer_holds *holds = &p->coupling.own;
   double push[6];
-  double answer[6];
-  double force = hapi_v3_norm(wrench->force);
-  if (force == 0.0 || !hapi_body_responds(body)) {
-    return 1.0;
-  }
   bond_push(body, p, wrench, push);
-  hapi_row_response(body, push, answer);
-  double gives = hapi_dot6(push, answer) / (force * force); /* 1/kg */
-  double stiffness = hapi_own_force_stiffness(&own->setup);
-  double damping = hapi_own_force_damping(&own->setup);
-  double late = hapi_max(stiffness / holds->stiffness, damping / holds->damping) *
-                (1.0 + holds->mass * gives);
-  double hard = (stiffness * period + 2.0 * damping) * period * gives;
-  double share = hard > HAPI_SAFETY_OWN_ANSWER ? HAPI_SAFETY_OWN_ANSWER / hard : 1.0;
-  return late > 1.0 ? hapi_min(share, 1.0 / late) : share;
+  return hapi_own_body_share(
+      body, p, facts, push,
+      (hapi_own_slope){hapi_own_force_stiffness(&own->setup), hapi_own_force_damping(&own->setup)});
 }
 
 /* ---- one of them ---- */
@@ -189,8 +169,8 @@ static bool own_value(hapi_own_force *own, const hapi_pointer *p, const hapi_loc
   bool force = hapi_v3_shorten(out->force, setup->max_force);
   bool torque = hapi_v3_shorten(out->torque, setup->max_torque);
   double holds = scaled_share(own, p);
-  if (body != NULL && facts->model == HAP_MODEL_CONTACT) {
-    holds = hapi_min(holds, bond_share(own, body, p, out, facts->period));
+  if (body != NULL) {
+    holds = hapi_min(holds, bond_share(own, body, p, facts, out));
   }
   if (holds < 1.0) {
     hapi_v3_scale(holds, out->force, out->force);

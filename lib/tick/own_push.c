@@ -10,6 +10,8 @@
 #include "guard/promise.h"
 #include "local/body_step.h"
 #include "local/rows.h"
+#include "pointer/own_force.h"
+#include "tick/own_hold.h"
 
 /* N, N m on a body, of one force. */
 typedef struct own_push {
@@ -128,21 +130,6 @@ static bool magnet_find(const hapi_own_pushing *at, const hapi_pair_magnet *magn
          (out->body->flags & HAPI_BODY_DRIVEN) == 0;
 }
 
-/* What the hand gets less, a light body could not hold: as of own forces. */
-static double magnet_holds(const hapi_own_pushing *at, const hapi_pair_magnet *magnet,
-                           const hapi_local_body *body)
-{
-  double answer[6];
-  double force2 = hapi_v3_dot(magnet->push, magnet->push);
-  if (at->facts->model != HAP_MODEL_CONTACT || force2 == 0.0 || !hapi_body_responds(body)) {
-    return 1.0;
-  }
-  hapi_row_response(body, magnet->push, answer);
-  double period = at->facts->period;
-  double hard = magnet->hardest * period * period * hapi_dot6(magnet->push, answer) / force2;
-  return hard > HAPI_SAFETY_OWN_ANSWER ? HAPI_SAFETY_OWN_ANSWER / hard : 1.0;
-}
-
 /* The opposite of what the hand gets, about the body's centre. */
 static void magnet_push(hapi_pair_magnet *magnet, const hapi_pointer *p,
                         const hapi_local_body *body)
@@ -154,6 +141,25 @@ static void magnet_push(hapi_pair_magnet *magnet, const hapi_pointer *p,
   hapi_v3_add(moment, magnet->pull.torque, moment);
   hapi_v3_scale(-1.0, magnet->pull.force, magnet->push);
   hapi_v3_scale(-1.0, moment, magnet->push + 3);
+}
+
+/* What the device cannot hold is cut, and what a light body cannot. */
+static void magnet_hold(const hapi_own_pushing *at, hapi_pair_magnet *magnet, hapi_pointer *p,
+                        const hapi_local_body *body)
+{
+  double most = hapi_magnet_hold(p);
+  double share = magnet->hardest > most ? most / magnet->hardest : 1.0;
+  if (body != NULL) {
+    const hapi_own_slope slope = {.stiffness = magnet->hardest};
+    magnet_push(magnet, p, body);
+    share = hapi_min(share, hapi_own_body_share(body, p, at->facts, magnet->push, slope));
+  }
+  if (share < 1.0) {
+    hapi_v3_scale(share, magnet->pull.force, magnet->pull.force);
+    hapi_v3_scale(share, magnet->pull.torque, magnet->pull.torque);
+    magnet->hardest *= share;
+    p->declared.held = true;
+  }
 }
 
 /* Within what it promises: its strength, at 1 m/s. */
@@ -191,12 +197,7 @@ void hapi_magnets_pull(const hapi_own_pushing *at)
       continue;
     }
     const hapi_local_body *body = hapi_bodies_at(at->bodies, magnet->body);
-    if (body != NULL) {
-      magnet_push(magnet, pointer, body);
-      double holds = magnet_holds(at, magnet, body);
-      hapi_v3_scale(holds, magnet->pull.force, magnet->pull.force);
-      hapi_v3_scale(holds, magnet->pull.torque, magnet->pull.torque);
-    }
+    magnet_hold(at, magnet, pointer, body);
     magnet_declare(at, pair, pointer);
     if (body != NULL) {
       magnet_push(magnet, pointer, body);

@@ -8,6 +8,7 @@
 #include "base/pointer_id.h"
 #include "base/vec.h"
 #include "pointer/coupling.h"
+#include "pointer/own_force.h"
 
 static void report_bodies(const hapi_bodies *from, hapi_state *out)
 {
@@ -145,6 +146,7 @@ static void report_pointers(const hapi_tick *tick, hapi_state *out)
     pointers[i].collide_bits = in->shape.collide_bits;
     pointers[i].radius = in->shape.radius;
     pointers[i].stiffness = in->surface.stiffness;
+    pointers[i].magnet_hold = hapi_magnet_hold(in);
     pointers[i].damping = in->surface.damping;
     pointers[i].friction = in->surface.friction;
     pointers[i].finger_radius = in->surface.finger_radius;
