@@ -22,17 +22,19 @@
 #define RADIUS 0.005 /* m, of the pointer */
 #define HALF 0.02    /* m, of the cube */
 #define GAP 1e-6
-#define PUSH 1e-3    /* m */
-#define STROKE 4e-3  /* m */
-#define BEGIN_S 0.05 /* the field has come in; then the hand goes, or the blow comes */
-#define CONTACT 1e3  /* N/m, of a pointer that strokes no texture */
-#define LIMIT 20.0   /* N, of the pointer */
-#define PROMISE 10.0 /* N, of springs and functions */
-#define PULL 5.0     /* N, of magnets and detents */
-#define SHAKE 2.0    /* N, of a vibration */
-#define HEIGHT 1e-4  /* m, of a texture's waves */
-#define WAVE 2e-3    /* m */
-#define POWER_S 0.1  /* docs/forces.md: promised power is a mean over this time */
+#define PUSH 1e-3       /* m */
+#define STROKE 4e-3     /* m */
+#define BEGIN_S 0.05    /* the field has come in; then the hand goes, or the blow comes */
+#define CONTACT 1e3     /* N/m, of a pointer that strokes no texture */
+#define LIMIT 20.0      /* N, of the pointer */
+#define PROMISE 10.0    /* N, of springs and functions */
+#define PULL 5.0        /* N, of magnets and detents */
+#define SHAKE 2.0       /* N, of a vibration */
+#define HEIGHT 1e-4     /* m, of a texture's waves */
+#define WAVE 2e-3       /* m */
+#define REACH_MOST 0.05 /* m, of a surface's pull */
+#define REACH_LEAST 0.001
+#define POWER_S 0.1                    /* docs/forces.md: promised power is a mean over this time */
 #define MAGNET_SLOPE 2.598076211353316 /* likewise: at the middle, of strength / range */
 
 typedef struct own_bed {
@@ -46,6 +48,8 @@ typedef struct own_bed {
   hap_force_def def;
   hap_force_id force;
   uint32_t texture;
+  double pull;      /* N, of a surface */
+  double reach;     /* m, likewise, of a magnet */
   double stiffness; /* N/m, of the field as it is */
   double at[3];     /* m, pose of the cube after the newest tick, with its velocity */
   double speed;
@@ -55,9 +59,9 @@ typedef struct own_bed {
 
 const char *own_field_word(own_field field)
 {
-  static const char *const words[OWN_FIELDS] = {"spring",    "viscous",   "magnet", "detents",
-                                                "vibration", "call",      "untold", "texture",
-                                                "grab-soft", "grab-rigid"};
+  static const char *const words[OWN_FIELDS] = {"spring",    "viscous", "magnet",    "detents",
+                                                "vibration", "call",    "untold",    "texture",
+                                                "adhesion",  "snap",    "grab-soft", "grab-rigid"};
   return words[field];
 }
 
@@ -69,6 +73,17 @@ bool own_field_binds(own_field field)
 bool own_field_drives(own_field field)
 {
   return field == OWN_VIBRATION || field == OWN_UNTOLD;
+}
+
+static bool is_surface(own_field field)
+{
+  return field == OWN_TEXTURE || field == OWN_ADHESION || field == OWN_SNAP;
+}
+
+/* Whether the surface's stiffness is that of the point. */
+static bool is_hard(own_field field)
+{
+  return field == OWN_TEXTURE || field == OWN_ADHESION;
 }
 
 static bool is_grab(own_field field)
@@ -84,11 +99,18 @@ static double wash_height(void *arg, const double point[3])
   return HEIGHT * sin(2.0 * M_PI * point[0] / WAVE);
 }
 
-static void surface_wash(void *user, hap_pointer_id pointer, dGeomID geom, hap_surface *io)
+static void surface_say(void *user, hap_pointer_id pointer, dGeomID geom, hap_surface *io)
 {
+  const own_bed *s = user;
   (void)pointer;
-  (void)geom;
-  io->texture = *(const uint32_t *)user;
+  if (s->point->field == OWN_TEXTURE) {
+    io->texture = s->texture;
+  } else if (s->point->field == OWN_ADHESION) {
+    io->adhesion = PULL;
+  } else if (dGeomGetBody(geom) == s->cube) {
+    io->magnet_force = s->pull;
+    io->magnet_reach = s->reach;
+  }
 }
 
 static void call_spring(void *user, const hap_force_tick *tick, hap_wrench *out)
@@ -159,7 +181,8 @@ static hap_status field_add(own_bed *s)
 {
   const own_point *p = s->point;
   hap_grab_def grab;
-  if (p->field == OWN_TEXTURE) {
+  if (is_surface(p->field)) {
+    s->def.max_force = p->field == OWN_SNAP ? s->pull : 0.0; /* docs/surfaces.md */
     return HAP_OK;
   }
   if (!is_grab(p->field)) {
@@ -212,10 +235,11 @@ static hap_status session_open(bench *b, own_bed *s)
   research.guard = s->point->guarded ? HAP_GUARD_ON : HAP_GUARD_MEASURE;
   ode.world = s->world;
   ode.space = s->space;
-  ode.pointer_surface = s->point->field == OWN_TEXTURE ? surface_wash : NULL;
-  ode.user = &s->texture;
+  ode.pointer_surface = is_surface(s->point->field) ? surface_say : NULL;
+  ode.user = s;
+  ode.magnet_reach = s->point->field == OWN_SNAP ? REACH_MOST : 0.0;
   pointer.radius = RADIUS;
-  pointer.stiffness = s->point->field == OWN_TEXTURE ? s->point->stiffness : CONTACT;
+  pointer.stiffness = is_hard(s->point->field) ? s->point->stiffness : CONTACT;
   pointer.max_force = LIMIT;
   pointer_expert.coupling = s->point->coupling;
   wash.height = wash_height;
@@ -265,6 +289,12 @@ static void cube_look(own_bed *s)
   s->kinetic = 0.5 * s->point->mass * hapi_v3_dot(v, v) + 0.5 * inertia * hapi_v3_dot(w, w);
 }
 
+/* The whole of a magnet's well: what is counted too much is cut to what was taken. */
+static double snap_energy(const own_bed *s)
+{
+  return 0.25 * MAGNET_SLOPE * s->pull * s->reach;
+}
+
 /* J, of the field: no more than it can hold. A cube that turns is left out: what is counted too
  * much is cut to what was taken. */
 static double field_energy(const own_bed *s)
@@ -287,6 +317,8 @@ static double field_energy(const own_bed *s)
       double depth = 0.25 * MAGNET_SLOPE * s->def.strength * s->def.range;
       return depth * (1.0 - (1.0 - u2) * (1.0 - u2));
     }
+    case OWN_SNAP:
+      return snap_energy(s);
     case OWN_DETENTS:
       return s->def.strength * s->def.pitch / (2.0 * M_PI) *
              (1.0 - cos(2.0 * M_PI * way[0] / s->def.pitch));
@@ -296,6 +328,7 @@ static double field_energy(const own_bed *s)
     case OWN_VISCOUS:
     case OWN_VIBRATION:
     case OWN_TEXTURE:
+    case OWN_ADHESION: /* its spring is the contact's */
     case OWN_FIELDS:
       break;
   }
@@ -306,7 +339,7 @@ static double springs_energy(const own_bed *s)
 {
   const hapi_tick *tick = &s->session->haptic->tick;
   const hapi_pointer *p = &tick->pointers.of[0];
-  const double contact = s->point->field == OWN_TEXTURE ? s->point->stiffness : CONTACT;
+  const double contact = is_hard(s->point->field) ? s->point->stiffness : CONTACT;
   double sum = field_energy(s);
   for (uint32_t i = 0; i < tick->touches.count; ++i) {
     const double *force = tick->touches.of[i].force;
@@ -345,7 +378,7 @@ static bool tick_run(own_bed *s, double seconds, hapi_virtual_port *port, own_re
   out->made = s->energy.made;
   double promised = power * (seconds + POWER_S) + 0.01 * s->energy.stored;
   return out->force <= LIMIT * (1.0 + 1e-9) && out->own <= 1.0 + 1e-9 &&
-         (is_grab(s->point->field) || s->point->field == OWN_TEXTURE || s->energy.made <= promised);
+         (!has || s->energy.made <= promised);
 }
 
 hap_status own_run(bench *b, const own_point *point, double seconds, own_result *out)
@@ -356,6 +389,8 @@ hap_status own_run(bench *b, const own_point *point, double seconds, own_result 
   memset(&s, 0, sizeof s);
   s.point = point;
   s.energy.finite = true;
+  s.reach = fmin(fmax(MAGNET_SLOPE * PULL / point->stiffness, REACH_LEAST), REACH_MOST);
+  s.pull = point->stiffness * s.reach / MAGNET_SLOPE;
   bed_build(&s);
   hap_status status = session_open(b, &s);
   if (status >= HAP_OK) {

@@ -29,6 +29,8 @@ typedef enum own_field {
   OWN_CALL,   /* a spring that says its stiffness */
   OWN_UNTOLD, /* a function that says that it goes by time, and is a spring */
   OWN_TEXTURE,
+  OWN_ADHESION,
+  OWN_SNAP,      /* a surface that pulls from a distance */
   OWN_GRAB_SOFT, /* of the stiffness */
   OWN_GRAB_RIGID,
   OWN_FIELDS
@@ -38,9 +40,10 @@ typedef struct own_point {
   own_field field;
   bool bound; /* to the cube; else to the world */
   hap_coupling coupling;
-  double stiffness; /* N/m: steepest slope of the field; of a texture's contact; VISCOUS: 100 1/s of
+  double
+      stiffness; /* N/m: steepest slope of the field; of a texture's and an adhesion's contact; VISCOUS: 100 1/s of
                        it; VIBRATION: of 0.1 mm, with hz = sqrt */
-  double mass;      /* kg of the cube */
+  double mass; /* kg of the cube */
   double haptic_hz;
   double delay_ticks;
   double quantum; /* m */
