@@ -16,6 +16,7 @@
 #include "haptic/own_call.h"
 #include "tests/desk.h"
 #include "tests/files.h"
+#include "tests/logged.h"
 
 #define EXACT 1e-9 /* N */
 #define WAIT_MS 20000
@@ -352,24 +353,6 @@ static desk *threads_desk(void)
   d->def.drive = HAP_DRIVE_THREADS;
   d->def.rt_priority = 0;
   return d;
-}
-
-static char logged[2048];
-
-static void log_keep(hap_log_level level, const char *text, void *user)
-{
-  (void)user;
-  (void)level;
-  size_t used = strlen(logged);
-  snprintf(logged + used, sizeof logged - used, "%s\n", text);
-}
-
-static void log_listen(bool listen)
-{
-  hap_hooks hooks;
-  hap_hooks_init(&hooks, sizeof hooks);
-  hooks.log = listen ? log_keep : NULL;
-  REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
 }
 
 static bool out_within(desk *d, hap_force_id id, hap_force_out want)

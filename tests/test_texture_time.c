@@ -9,6 +9,7 @@
 #include <stdatomic.h>
 
 #include "tests/desk.h"
+#include "tests/logged.h"
 
 #define HEIGHT 1e-3 /* m */
 #define DEPTH 2e-3  /* m */
@@ -126,24 +127,6 @@ TEST(in_lockstep_the_time_of_a_texture_is_measured_and_not_judged)
   CHECK(state.ticks == before + 30 && state.late_ticks >= 30 && state.us_max >= 1000.0);
   CHECK(state.us_mean * (double)state.ticks >= 30.0 * 1000.0 && state.is_out == 0);
   check_vector(desk_state(d).wrench.force, 0.0, 0.0, STIFFNESS * (DEPTH + HEIGHT), 1e-6);
-}
-
-static char logged[2048];
-
-static void log_keep(hap_log_level level, const char *text, void *user)
-{
-  (void)user;
-  (void)level;
-  size_t used = strlen(logged);
-  snprintf(logged + used, sizeof logged - used, "%s\n", text);
-}
-
-static void log_listen(bool listen)
-{
-  hap_hooks hooks;
-  hap_hooks_init(&hooks, sizeof hooks);
-  hooks.log = listen ? log_keep : NULL;
-  REQUIRE(hap_hooks_set(&hooks) == HAP_OK);
 }
 
 /* Late ticks of a busy machine. */
