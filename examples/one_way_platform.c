@@ -70,7 +70,11 @@ int main(void)
     printf("%.1f s  box %.3f m above the platform, hand feels %.2f N\n", 0.5 * (frame + 1),
            dBodyGetPosition(box)[2] - 0.0219, 0 - state.wrench.force[2]);
   }
+  hap_session_lock(session); /* another level comes */
+  hap_status gone = hap_session_remove_space(session, level);
+  dSpaceDestroy(level);
+  hap_session_unlock(session);
   hap_session_destroy(session);
   hap_device_close(hand_def.device);
-  return 0;
+  return gone < HAP_OK;
 }

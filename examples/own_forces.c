@@ -68,6 +68,9 @@ int main(void)
         return 1;
       }
     }
+    if (frame == 90 && hap_pointer_force_remove(session, hand, buzz_id) < HAP_OK) {
+      return 1; /* it has ended long ago: its place is free again */
+    }
   }
   hap_session_destroy(session);
   hap_device_close(hand_def.device);

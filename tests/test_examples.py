@@ -32,6 +32,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "list_a_scene": "docs/scene.md",
     "edit_a_scene": "docs/scene.md",
     "change_while_running": "docs/editing.md",
+    "wish_for_accuracy": "docs/accuracy.md",
     "near_the_hand": "docs/touches.md",
     "wrap_a_device": "docs/writing-a-device.md",
     "grip_and_feel": "docs/grippers.md",
@@ -275,6 +276,13 @@ def check_change_while_running(program):
     point(len(rows) == 6 and float(rows[1][1]) < -1.0, "the hand pushes three cubes", out)
     point(len(rows) == 6 and 85 <= steps[4] - steps[3] <= 95 and steps[5] - steps[4] > 900,
           "rate and model change", out)
+
+
+def check_wish_for_accuracy(program):
+    out = run(program)
+    rows = rows_of(out, r"^[0-9.]+ s  tick ([0-9.]+): (.+); physics ([0-9.]+): (.+)$")
+    point(len(rows) == 4 and rows[0][1] == rows[0][3] == "asked for", "the dial is as asked", out)
+    point(len(rows) == 4 and rows[3][1] == "asked for", "and again in the end", out)
 
 
 def check_near_the_hand(program):

@@ -24,10 +24,6 @@ def because(reason, names):
 
 # Function: why no program shows it.
 NO_PROGRAM = {
-    **because("the page of its subject has the lines", """
-        hap_session_set_budget hap_session_set_force_error"""),
-    **because("one call, as its neighbour in the header, which a program shows", """
-        hap_pointer_force_remove hap_session_remove_space"""),
     **because("a name for people, or defaults of a struct", """
         hap_event_name hap_force_kind_name hap_grab_def_init hap_scene_def_init
         hap_scene_name_at"""),
