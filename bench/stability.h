@@ -25,6 +25,7 @@
 #include <hapode/hapode.h>
 
 #include "plugins/virtual/virtual.h"
+#include "pointer/pointer.h"
 
 /* Of --only. */
 #define STABILITY_KEYS                                                                         \
@@ -87,6 +88,9 @@ void stability_account_tick(stability_account *io, const hapi_virtual_port *was,
                             const hapi_virtual_port *now, double period, double kinetic,
                             double springs);
 double stability_account_ratio(const stability_account *account);
+
+/* J, of the spring between device and proxy, with the device where it was measured last. */
+double stability_coupling_energy(const hapi_pointer *p);
 
 const char *stability_hand_word(stability_hand hand); /* as the virtual device spells it */
 const char *stability_layout_word(stability_layout layout);

@@ -345,14 +345,7 @@ static double springs_energy(const own_bed *s)
     const double *force = tick->touches.of[i].force;
     sum += 0.5 * hapi_v3_dot(force, force) / contact;
   }
-  if (p->proxied) {
-    double apart[3];
-    hapi_v3_sub(p->proxy.position, p->handle.position, apart);
-    hapi_v3_sub(apart, p->proxy.offset, apart);
-    sum += 0.5 * p->coupling.stiffness * hapi_v3_dot(apart, apart);
-    sum += 0.5 * p->coupling.mass * hapi_v3_dot(p->proxy.velocity, p->proxy.velocity);
-  }
-  return sum;
+  return sum + stability_coupling_energy(p);
 }
 
 /* ---- the run ---- */

@@ -218,6 +218,18 @@ static void bodies_look(stability_bed *s)
   }
 }
 
+double stability_coupling_energy(const hapi_pointer *p)
+{
+  double apart[3];
+  if (!p->proxied) {
+    return 0.0;
+  }
+  hapi_v3_sub(p->proxy.position, p->handle.position, apart);
+  hapi_v3_sub(apart, p->proxy.offset, apart);
+  return 0.5 * p->coupling.stiffness * hapi_v3_dot(apart, apart) +
+         0.5 * p->coupling.mass * hapi_v3_dot(p->proxy.velocity, p->proxy.velocity);
+}
+
 /* J, of the contacts' springs, from their forces, and of the coupling's, with the device where it
  * was measured last. */
 static double springs_energy(const stability_bed *s)
@@ -229,14 +241,7 @@ static double springs_energy(const stability_bed *s)
     const double *force = tick->touches.of[i].force;
     sum += 0.5 * hapi_v3_dot(force, force) / s->point->stiffness;
   }
-  if (p->proxied) {
-    double apart[3];
-    hapi_v3_sub(p->proxy.position, p->handle.position, apart);
-    hapi_v3_sub(apart, p->proxy.offset, apart);
-    sum += 0.5 * p->coupling.stiffness * hapi_v3_dot(apart, apart);
-    sum += 0.5 * p->coupling.mass * hapi_v3_dot(p->proxy.velocity, p->proxy.velocity);
-  }
-  return sum;
+  return sum + stability_coupling_energy(p);
 }
 
 void stability_account_tick(stability_account *io, const hapi_virtual_port *was,
