@@ -40,9 +40,9 @@ typedef struct own_point {
   own_field field;
   bool bound; /* to the cube; else to the world */
   hap_coupling coupling;
-  double
-      stiffness; /* N/m: steepest slope of the field; of a texture's and an adhesion's contact; VISCOUS: 100 1/s of
-                       it; VIBRATION: of 0.1 mm, with hz = sqrt */
+  /* N/m: steepest slope of the field; of the contact under a texture or adhesion; VISCOUS: 100 1/s
+   * of it; VIBRATION: of 0.1 mm, with hz = sqrt */
+  double stiffness;
   double mass; /* kg of the cube */
   double haptic_hz;
   double delay_ticks;
