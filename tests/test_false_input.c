@@ -72,6 +72,7 @@ TEST(a_spidar_that_tells_what_is_false)
   static const false_input_kind kinds[] = {FALSE_ONE_SPIKES, FALSE_ALL_SPIKES, FALSE_SINGLE,
                                            FALSE_ONE_STUCK,  FALSE_ONE_DRIFTS, FALSE_BOARD_STUCK,
                                            FALSE_ALL_STUCK,  FALSE_ALL_ALWAYS, FALSE_ALWAYS};
+  static const false_input_kind old[] = {FALSE_OLD};
   false_input_def def;
   false_input_init(&def);
   for (int row = 0; row < 2; ++row) {
@@ -79,6 +80,9 @@ TEST(a_spidar_that_tells_what_is_false)
     look_at_all(&def, kinds, sizeof kinds / sizeof kinds[0]);
   }
   CHECK(strstr(run.text, "string 2 is") != NULL);
+  def.row = false;
+  def.seed = 5; /* an old reply is believed, and the right ones behind it were told before */
+  look_at_all(&def, old, 1);
 }
 
 TEST(a_virtual_device_that_tells_what_is_false)
@@ -802,6 +806,50 @@ TEST(replies_of_some_time_ago_are_known_again)
     CHECK(i < 100 || wires_off() < 3e-4);
   }
   CHECK(refused > 0.8 * far && refused <= far);
+}
+
+/* A grip that goes to and fro so slowly that counts come again. */
+static void wires_rest(void)
+{
+  wires_begin("x4r");
+  for (int i = 0; i < 300; ++i) {
+    CHECK(wires_tell(3e-3 + 2e-5 * sin(0.03 * i), 0.0, -1, 0.0) == HAPI_SPIDAR_BELIEVED);
+  }
+}
+
+/* One reply is old, of counts that were never told, and within a hand's motion of 1 ms: nobody can
+ * know it. The right ones behind it are no leap back, though their counts were there before. */
+TEST(an_old_reply_that_was_believed_does_not_doubt_the_right_ones)
+{
+  for (int way = 1; way <= 8; ++way) {
+    wires_rest();
+    CHECK(wires_tell(3e-3 - 4e-5 * way, 3e-5, -1, 0.0) == HAPI_SPIDAR_BELIEVED);
+    for (int i = 0; i < 10; ++i) {
+      hapi_spidar_verdict said = wires_tell(3e-3, 0.0, -1, 0.0);
+      CHECK_SAY(said == HAPI_SPIDAR_BELIEVED, "%d um off, reply %d", 40 * way, i);
+      CHECK_SAY(wires_off() < 5e-5, "%d um off, reply %d: %g mm", 40 * way, i, 1e3 * wires_off());
+    }
+  }
+}
+
+/* The same, and then nothing can be believed: the velocity of the old reply carries nothing. */
+TEST(an_old_reply_that_was_believed_carries_nothing_on)
+{
+  wires_rest();
+  CHECK(wires_tell(3e-3 - 3.2e-4, 3e-5, -1, 0.0) == HAPI_SPIDAR_BELIEVED);
+  CHECK(hapi_v3_norm(wires.belief.twist.linear) > 0.1);
+  for (int i = 0; i < 4; ++i) {
+    strings *w = &wires;
+    double false_counts[HAPI_SPIDAR_STRINGS_MAX];
+    memcpy(false_counts, w->counts, sizeof false_counts);
+    for (int k = 0; k < 8; ++k) {
+      false_counts[k] += k == 0 ? 300.0 : k == 3 ? -280.0 : k == 5 ? 260.0 : 0.0;
+    }
+    w->ns += MS;
+    CHECK(hapi_spidar_belief_update(&w->belief, &w->model, w->ns, false_counts, true) ==
+          HAPI_SPIDAR_DOUBTED);
+    CHECK_SAY(wires_off() < 5e-5, "reply %d: %g mm", i, 1e3 * wires_off());
+  }
 }
 
 TEST(strings_without_tension_are_not_judged)

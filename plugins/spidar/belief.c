@@ -22,6 +22,11 @@
  *            counts are those of some time ago, and not where the strings were going: a hand does
  *            not leap back to the very count of each string.
  *
+ * One old reply that is near enough may be believed, when its counts were never told. The velocity
+ * that it makes is false, and the right replies behind it seem to leap back. So what goes on from
+ * the course before the newest believed reply is no leap, and of the two velocities the smaller
+ * one carries the pose on.
+ *
  * Where several leave their lengths at once nothing is believed. The bound grows with the time
  * since the newest reply that was: a grip that really jumped is back after some ms. */
 
@@ -84,22 +89,38 @@ static bool is_known(hapi_spidar_belief *b, const hapi_spidar_model *model, bool
   return known;
 }
 
-/* Some string is not where it was going, by more than a hand is likely to turn it from there. */
-static bool is_off(const hapi_spidar_belief *b, const hapi_spidar_model *model,
-                   const double rates[HAPI_SPIDAR_STRINGS_MAX], double seconds,
-                   const double lengths[HAPI_SPIDAR_STRINGS_MAX])
+/* The course since the newest reply that is believed. */
+static hapi_spidar_course course_now(const hapi_spidar_belief *b, int64_t time_ns,
+                                     const double rates[HAPI_SPIDAR_STRINGS_MAX])
 {
+  hapi_spidar_course now = {
+      .known = b->known, .time_ns = b->known ? b->believe_ns : time_ns, .twist = b->twist};
+  memcpy(now.length, b->length, sizeof now.length);
+  memcpy(now.rate, rates, sizeof now.rate);
+  return now;
+}
+
+/* Some string is not where it was going, by more than a hand is likely to turn it from there. */
+static bool is_off(const hapi_spidar_course *course, const hapi_spidar_model *model,
+                   int64_t time_ns, const double lengths[HAPI_SPIDAR_STRINGS_MAX])
+{
+  double seconds = 1e-9 * (double)(time_ns - course->time_ns);
   bool off = false;
-  for (int i = 0; b->known && i < model->strings; ++i) {
-    double way = lengths[i] - b->length[i] - seconds * rates[i];
+  for (int i = 0; course->known && i < model->strings; ++i) {
+    double way = lengths[i] - course->length[i] - seconds * course->rate[i];
     off = off || fabs(way) > HAPI_SAFETY_STALE_QUANTA * metres_of(model, i);
   }
   return off;
 }
 
+static double shorter_of(double a, double b)
+{
+  return a * b > 0.0 ? (fabs(a) < fabs(b) ? a : b) : 0.0;
+}
+
 /* Whether it is the reply before, though the strings run. */
 static bool is_stale(hapi_spidar_belief *b, const hapi_spidar_model *model, int64_t time_ns,
-                     const double rates[HAPI_SPIDAR_STRINGS_MAX], const double *counts)
+                     const hapi_spidar_course *now, const double *counts)
 {
   bool changed = !b->known;
   double finest = metres_of(model, 0);
@@ -112,7 +133,7 @@ static bool is_stale(hapi_spidar_belief *b, const hapi_spidar_model *model, int6
     b->change_ns = time_ns;
     b->pace = 0.0;
     for (int i = 0; i < model->strings; ++i) {
-      b->pace = hapi_max(fabs(rates[i]), b->pace);
+      b->pace = hapi_max(fabs(shorter_of(now->rate[i], b->before.rate[i])), b->pace);
     }
     return false;
   }
@@ -189,12 +210,17 @@ static void trial_believe(hapi_spidar_belief *b, const hapi_spidar_model *model,
   hapi_spidar_twist(model, &b->solver.pose, rates, &b->twist);
 }
 
-/* On as it went, no faster than a hand is sure to; then it stays. */
+/* On as it went, no faster than a hand is sure to; then it stays. Of the newest two velocities the
+ * smaller counts: the newest reply that was believed may have been false, too. */
 static void pose_carry(hapi_spidar_belief *b, int64_t time_ns, double seconds)
 {
   if (1e-9 * (double)(time_ns - b->believe_ns) > HAPI_SAFETY_CARRY_S) {
     memset(&b->twist, 0, sizeof b->twist);
     return;
+  }
+  for (int i = 0; i < 3; ++i) {
+    b->twist.linear[i] = shorter_of(b->twist.linear[i], b->before.twist.linear[i]);
+    b->twist.angular[i] = shorter_of(b->twist.angular[i], b->before.twist.angular[i]);
   }
   (void)hapi_v3_shorten(b->twist.linear, HAPI_SAFETY_CARRY_SPEED);
   (void)hapi_v3_shorten(b->twist.angular, HAPI_SAFETY_CARRY_SPIN);
@@ -215,10 +241,12 @@ hapi_spidar_verdict hapi_spidar_belief_update(hapi_spidar_belief *belief,
   hapi_spidar_measure(model, counts, lengths);
   hapi_spidar_rows_at(model, &b->solver.pose, &rows);
   rates_expect(b, &rows, model->strings, rates);
+  const hapi_spidar_course now = course_now(b, time_ns, rates);
   uint32_t suspects = strings_suspect(b, model, rates, since, lengths);
-  bool stale = is_stale(b, model, time_ns, rates, counts);
+  bool stale = is_stale(b, model, time_ns, &now, counts);
   int wrong = taut && can_spare(model) ? string_alone(suspects) : -1;
-  bool off = wrong < 0 && is_off(b, model, rates, since, lengths);
+  bool off = wrong < 0 && is_off(&now, model, time_ns, lengths) &&
+             (!b->before.known || is_off(&b->before, model, time_ns, lengths));
   stale = is_known(b, model, off, counts) || stale;
   b->update_ns = time_ns;
   bool good = wrong >= 0 ? fits_without(b, model, wrong, lengths)
@@ -226,6 +254,7 @@ hapi_spidar_verdict hapi_spidar_belief_update(hapi_spidar_belief *belief,
   bool crept = false;
   if (!taut) {
     b->wrong = -1;
+    b->before = now;
     trial_believe(b, model, time_ns, counts, lengths, false);
     return HAPI_SPIDAR_BELIEVED;
   }
@@ -242,6 +271,7 @@ hapi_spidar_verdict hapi_spidar_belief_update(hapi_spidar_belief *belief,
     return HAPI_SPIDAR_DOUBTED;
   }
   b->wrong = wrong;
+  b->before = now;
   trial_believe(b, model, time_ns, counts, lengths, crept);
   return wrong >= 0 ? HAPI_SPIDAR_SPARED : HAPI_SPIDAR_BELIEVED;
 }

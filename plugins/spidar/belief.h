@@ -19,12 +19,22 @@ typedef enum hapi_spidar_verdict {
   HAPI_SPIDAR_DOUBTED   /* no pose: the last one is carried on for a few ms and then stays */
 } hapi_spidar_verdict;
 
+/* Where strings were, and how they went on. */
+typedef struct hapi_spidar_course {
+  bool known;
+  int64_t time_ns;
+  double length[HAPI_SPIDAR_STRINGS_MAX]; /* m, believed; of one left out as it should have been */
+  double rate[HAPI_SPIDAR_STRINGS_MAX];   /* m/s */
+  hap_twist twist;                        /* of the grip, frame of the model */
+} hapi_spidar_course;
+
 typedef struct hapi_spidar_belief {
   hapi_spidar_solver solver; /* of the pose that is believed or carried on */
   hapi_spidar_solver trial;  /* goes on from reply to reply, whatever comes of them */
   hap_pose start;            /* the newest that was not carried on */
   hap_twist twist;           /* of the grip, frame of the model */
   hapi_spidar_rates rates;
+  hapi_spidar_course before;              /* up to the reply before the newest that is believed */
   bool known;                             /* there is something that a reply can be held against */
   int64_t update_ns;                      /* of the newest reply */
   int64_t believe_ns;                     /* of the newest that was not doubted */
