@@ -471,6 +471,35 @@ TEST(a_tool_pays_for_its_torque_as_far_as_it_turns)
   CHECK_NEAR(f.tick.guard.balance, -0.1 * 0.01, 1e-7);
 }
 
+static double grip_observe(hapi_pointer *p, double share)
+{
+  double before = f.tick.guard.balance;
+  p->grab.share = share;
+  p->grab.pull.stiffness = share * 1000.0;
+  hapi_energy_observe(&f.tick.guard, &f.tick.facts, &f.tick.pointers, &f.tick.bodies,
+                      &f.tick.touches);
+  return f.tick.guard.balance - before;
+}
+
+/* The spring of a grip is stretched by 4 mm all the time, and holds 8 mJ with its whole share. */
+TEST(what_fading_adds_to_the_spring_of_a_grip_nobody_paid_for)
+{
+  hapi_pointer *p = coupling_pointer();
+  f.tick.pointers.grabs = true;
+  p->guard.share = 1.0;
+  p->device.wrench.force[0] = 1.0;
+  p->grab.phase = HAPI_GRAB_HOLDS;
+  hapi_v3_set(p->grab.pull.way, 4e-3, 0.0, 0.0);
+  CHECK_NEAR(grip_observe(p, 0.5), 4e-3, 1e-9);
+  CHECK_NEAR(grip_observe(p, 0.5), 0.0, 1e-9);
+  CHECK_NEAR(grip_observe(p, 1.0), 4e-3, 1e-9);
+  CHECK_NEAR(grip_observe(p, 0.25), -6e-3, 1e-9);
+  CHECK_NEAR(grip_observe(p, 1.0), 6e-3, 1e-9);
+  p->belief.loss = 1.0; /* the device is not believed: nothing is felt */
+  CHECK_NEAR(grip_observe(p, 1.0), -8e-3, 1e-9);
+  CHECK_NEAR(grip_observe(p, 1.0), 0.0, 1e-9);
+}
+
 /* F^2 / 2 k, m v^2 / 2, and of a tool the same of its turning. */
 TEST(what_is_stored_between_a_device_and_its_proxy)
 {

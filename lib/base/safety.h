@@ -34,6 +34,9 @@
 #define HAPI_SAFETY_STEP_LEAST 2e-5          /* m */
 #define HAPI_SAFETY_GAP_MOST_S 0.02          /* s */
 #define HAPI_SAFETY_REST_GAPS 2.0            /* 1 */
+#define HAPI_SAFETY_VOTE_TICKS 3.5           /* 1 */
+#define HAPI_SAFETY_SOON_SHARE 0.5           /* 1 */
+#define HAPI_SAFETY_SURE_SHARE 0.25          /* 1 */
 #define HAPI_SAFETY_UNREAD_S 0.02            /* s */
 #define HAPI_SAFETY_READ_LATE_S 0.002        /* s */
 #define HAPI_SAFETY_DOUBT_FORGET 0.25        /* 1 */

@@ -32,10 +32,7 @@
 
 #define HIT_MOST \
   (HAPI_SAFETY_ACCELERATION_LIMIT * HAPI_SAFETY_JUDGE_S * HAPI_SAFETY_JUDGE_S) /* m */
-#define GAP_TICKS 1.5   /* ticks between two positions, from which on the device is slow */
-#define VOTE_TICKS 3.5  /* the same, from which on some of them can vote */
-#define SURE_SHARE 0.25 /* of the time between two positions */
-#define SOON_SHARE 0.5  /* of the time between two, before which another one is too early */
+#define GAP_TICKS 1.5 /* ticks between two positions, from which on the device is slow */
 
 static double seconds_between(int64_t from_ns, int64_t to_ns)
 {
@@ -310,8 +307,8 @@ static void rest_take(hapi_believed_way *w)
 /* Too early for another position of a device that tells each for some time. */
 static bool is_soon(const hapi_believed_way *w, int64_t now_ns, double tick)
 {
-  return w->pace.gap > VOTE_TICKS * tick &&
-         seconds_between(w->sample_ns, now_ns) < SOON_SHARE * w->pace.gap;
+  return w->pace.gap > HAPI_SAFETY_VOTE_TICKS * tick &&
+         seconds_between(w->sample_ns, now_ns) < HAPI_SAFETY_SOON_SHARE * w->pace.gap;
 }
 
 /* Whether the pose that came last has to give way to the one that is told now. Soon after it this
@@ -329,7 +326,7 @@ static bool votes_turn(hapi_pointer *p, bool soon, int64_t now_ns, double tick)
  * once. */
 static double sure_after(const hapi_pointer_belief *b)
 {
-  return hapi_min(HAPI_SAFETY_JUDGE_S, SURE_SHARE * b->way.pace.gap);
+  return hapi_min(HAPI_SAFETY_JUDGE_S, HAPI_SAFETY_SURE_SHARE * b->way.pace.gap);
 }
 
 /* The pose that is told stays, though the device tells another one. */
