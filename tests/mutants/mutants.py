@@ -47,6 +47,7 @@ AREAS = [
     ("lib/device/emergency.c", WATCH_TESTS),
     ("lib/device/watchdog.c", WATCH_TESTS),
     ("lib/haptic/standstill.c", WATCH_TESTS),
+    ("lib/haptic/texture_time.c", ["texture_time", "surfaces"]),
     ("lib/guard/*.c", GUARD_TESTS + GRIP_TESTS),
     ("lib/pointer/device_pace.c", ["device_pace", "false_input"]),
     ("lib/pointer/plausible.c", ["safety_numbers", "false_input", "faults", "late"]),
