@@ -143,6 +143,25 @@ TEST(what_moves_under_the_finger_feeds_the_swing)
   CHECK(!swing_took());
 }
 
+/* A declared spring of 300 N/m goes on beyond a contact of 1 kN/m, or goes with it, or with the
+ * spring of a proxy: the force follows the way all the same. */
+TEST(a_swing_with_a_declared_spring_is_found)
+{
+  for (int how = 0; how < 3; ++how) {
+    hapi_pointer *p = swing_pointer();
+    p->surface.stiffness = p->coupling.stiffness = 1000.0;
+    p->declared.stiffness = 300.0;
+    p->proxied = how == 2;
+    for (int i = 0; i < 1000; ++i) {
+      double way = 0.005 * sin(2.0 * M_PI * 12.0 * i * T);
+      bool touches = how > 0 || way > 0.0;
+      p->contacts = touches && how < 2 ? 1 : 0;
+      swing_tick(-(touches ? 1300.0 : 300.0) * way, way, 0.0);
+    }
+    CHECK_SAY(swing_took(), "%d", how);
+  }
+}
+
 /* The same 1e-4 J a tick, as 1 N on the body while it comes at 0.1 m/s; other models have it in
  * what their springs note. A body that goes the other way takes it. */
 TEST(a_body_that_is_held_feeds_the_swing)
