@@ -28,6 +28,7 @@
 #define OLD_S 0.05
 #define OLD_MAX 512  /* ticks that are kept */
 #define STRING 2     /* the one that is false */
+#define DAMPING 1.0  /* N s/m, of the contact */
 #define HOLD_S 0.004 /* between new positions of the coarse device */
 #define QUANTUM 5e-5 /* m, of the same */
 
@@ -476,7 +477,7 @@ static hap_status pointer_add(stage *s, hap_detail *detail)
   pointer.device = s->device;
   pointer.radius = RADIUS;
   pointer.stiffness = s->def->stiffness;
-  pointer.damping = 1.0;
+  pointer.damping = DAMPING;
   pointer.friction = 0.3;
   pointer.max_force = 20.0;
   status = hap_pointer_add(s->session, &pointer, &s->pointer);
@@ -580,14 +581,41 @@ bool false_input_is_told(const false_input_run *run)
          (run->told_s >= 0.0 && run->told_s <= run->seen_s + FALSE_INPUT_TOLD_S);
 }
 
+/* N, more than undisturbed, on a hand that really goes where a slow device says: by the spike to
+ * and fro. Spring and damper, with the whole way within the time between two positions. None where
+ * no hand goes so far in that time. */
+static double motion_more(const false_input_def *def)
+{
+  bool always = def->kind == FALSE_ALWAYS || def->kind == FALSE_ALL_ALWAYS;
+  bool is_motion = 2.0 * def->spike <= HAPI_SAFETY_SWING_LIMIT * HOLD_S * HOLD_S;
+  return def->device == FALSE_INPUT_COARSE && always && is_motion
+             ? def->spike * (def->stiffness + 2.0 * DAMPING / HOLD_S)
+             : 0.0;
+}
+
+/* N, by which that changes in 2 ms: half of the way, and from speed to speed. */
+static double motion_steps(const false_input_def *def)
+{
+  return motion_more(def) > 0.0
+             ? def->spike * (def->stiffness * 2.0 * 0.002 / HOLD_S + 4.0 * DAMPING / HOLD_S)
+             : 0.0;
+}
+
 void false_input_compare(const false_input_def *def, const false_input_run *right,
                          const false_input_run *run, false_input_figures *out)
 {
   run_extremes(def, right, &out->peak_right, &out->step_right);
   run_extremes(def, run, &out->peak, &out->step);
-  out->share = 0.0;
+  out->share = out->step_more = 0.0;
+  int apart = (int)(0.002 * def->haptic_hz + 0.5);
   for (int i = (int)(FALSE_INPUT_BEGIN_S * def->haptic_hz); i < run->ticks; ++i) {
-    out->share =
-        fmax(out->share, hapi_v3_norm(run->force[i]) / fmax(out->peak_right, run->pressed[i]));
+    double since = i / def->haptic_hz - FALSE_INPUT_BEGIN_S;
+    bool unknown = run->seen_s < 0.0 || since <= run->seen_s + FALSE_INPUT_TOLD_S;
+    double right_now = fmax(out->peak_right, run->pressed[i]) + (unknown ? motion_more(def) : 0.0);
+    double change[3];
+    hapi_v3_sub(run->force[i], run->force[i - apart], change);
+    double known = out->step_right + (since <= FALSE_INPUT_LENGTH_S ? motion_steps(def) : 0.0);
+    out->step_more = fmax(out->step_more, hapi_v3_norm(change) - known);
+    out->share = fmax(out->share, hapi_v3_norm(run->force[i]) / right_now);
   }
 }

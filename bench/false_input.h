@@ -68,9 +68,12 @@ typedef struct false_input_run {
 typedef struct false_input_figures {
   double peak;       /* N, largest force from FALSE_INPUT_BEGIN_S on */
   double peak_right; /* N, the same undisturbed */
-  double share;      /* largest force over what is right: peak_right, or what the hand presses */
-  double step;       /* N, largest change in 2 ms */
+  double share; /* largest force over what is right: peak_right, or what the hand presses; until
+                        it can be seen that all positions of a slow device are false, what a hand
+                        would feel that moves so */
+  double step;  /* N, largest change in 2 ms */
   double step_right;
+  double step_more; /* N, largest change beyond that, and beyond what such a hand makes */
 } false_input_figures;
 
 void false_input_init(false_input_def *def);

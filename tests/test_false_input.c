@@ -46,7 +46,7 @@ static void look_at(const false_input_def *def)
          1e3 * run.fault_s);
   CHECK(f.peak_right > 4.0);
   CHECK(f.share <= 1.1);
-  CHECK(f.step <= 2.0 + f.step_right);
+  CHECK(f.step_more <= 2.0);
   CHECK_SAY(false_input_is_told(&run), "to be seen at %.0f ms, told at %.0f ms", 1e3 * run.seen_s,
             1e3 * run.told_s);
   if (def->kind == FALSE_ALWAYS || def->kind == FALSE_ALL_ALWAYS) {
