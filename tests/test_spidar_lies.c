@@ -9,6 +9,7 @@
 
 #include <hapode/device_impl.h>
 
+#include "base/safety.h"
 #include "bench/seen.h"
 #include "plugins/spidar/spidar.h"
 #include "tests/ode_world.h"
@@ -329,6 +330,7 @@ typedef struct run {
   double place[TICKS];   /* m, x of the hand */
   double told_s;         /* since the lie began; < 0: never */
   double seen_s;         /* since then, when the lengths fit no pose */
+  int32_t behind;        /* counts, the most by which a string turns in 3 ms */
   uint32_t fault;
 } run;
 
@@ -344,6 +346,19 @@ static double boards_misfit(const boards *b)
     error[i] = count_sign[i] * PER_COUNT * (encoder_count(b, i) - encoder_right(b, i));
   }
   return seen_misfit(motors, grips, &pose, error);
+}
+
+/* Counts, the most by which a string turned since the tick three before. */
+static int32_t boards_behind(const boards *b, int tick)
+{
+  static int32_t told[4][STRINGS];
+  int32_t most = 0;
+  for (int i = 0; i < STRINGS; ++i) {
+    int32_t way = encoder_right(b, i) - told[(tick + 1) % 4][i];
+    told[tick % 4][i] = encoder_right(b, i);
+    most = abs(way) > most ? abs(way) : most;
+  }
+  return most;
 }
 
 static void run_make(lie tells, double haste, run *out)
@@ -362,6 +377,7 @@ static void run_make(lie tells, double haste, run *out)
   b.haste = haste;
   out->told_s = out->seen_s = -1.0;
   out->fault = 0;
+  out->behind = 0;
   ode_world_make(0.0, &world, &space);
   dGeomSetPosition(dCreateBox(space, 0.1, 1.0, 1.0), FACE + 0.01 + 0.05, 0.0, 0.0);
   hap_session_def_init(&def, sizeof def);
@@ -391,6 +407,8 @@ static void run_make(lie tells, double haste, run *out)
     hand_feel(&b, out->felt[i]);
     out->place[i] = b.position[0];
     out->fault = stats.faults.fault;
+    int32_t behind = boards_behind(&b, i);
+    out->behind = i >= BEGIN && behind > out->behind ? behind : out->behind;
     if (i >= BEGIN && out->seen_s < 0.0 && boards_misfit(&b) > b.device.model.residual) {
       out->seen_s = (double)(i - BEGIN) / HZ;
     }
@@ -434,8 +452,10 @@ TEST(the_hand_feels_the_wall)
   CHECK(right.fault == 0 && right.told_s < 0.0);
 }
 
-static void lies_try(double haste)
+/* How often replies that come twice were told. */
+static int lies_try(double haste)
 {
+  int told_twice = 0;
   static const char *const names[LIES] = {
       "none",    "backwards", "swapped", "stretched", "all of them stretched",
       "low bit", "high bit",  "twice",   "collides"};
@@ -462,13 +482,19 @@ static void lies_try(double haste)
     if (l == LIE_SWAPPED || l == LIE_HIGH_BIT) {
       CHECK(lied.told_s <= 0.02 && lied.fault == HAP_FAULT_DEVICE_INPUT);
     }
-    CHECK(l != LIE_TWICE || (lied.told_s >= 0.0 && lied.fault == HAP_FAULT_NONE));
+    if (l == LIE_TWICE) { /* an old reply that is hardly behind is no harm, and cannot be told */
+      printf("# at most %d counts behind\n", lied.behind);
+      CHECK(lied.fault == HAP_FAULT_NONE);
+      CHECK(lied.told_s >= 0.0 || lied.behind < 2.0 * HAPI_SAFETY_STALE_QUANTA);
+      told_twice += lied.told_s >= 0.0;
+    }
     CHECK(lied.seen_s < 0.0 || (lied.told_s >= 0.0 && lied.told_s <= lied.seen_s + 0.02));
   }
+  return told_twice;
 }
 
 TEST(boards_that_lie_make_no_force)
 {
-  lies_try(1.0);
-  lies_try(3.0);
+  (void)lies_try(1.0);
+  CHECK(lies_try(3.0) == 1);
 }
