@@ -87,4 +87,7 @@ hap_status impedance_listen(bench *b, port *p, int settle_ticks, impedance_sums 
  * of a coupling's spring before a wall that does not give (1 MN/m). */
 hap_status zwidth_of_coupling(bench *b, hap_coupling coupling, double *out);
 
+/* The stiffest walls of several devices at 1, 4 and 10 kHz: zwidth.csv and its picture. */
+hap_status zwidth_run(bench *b);
+
 #endif

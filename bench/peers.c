@@ -2,7 +2,8 @@
  * SPDX-License-Identifier: MIT */
 
 /* hapode-bench peers: the same worlds, hand and pointer in a session and in engines that are
- * stepped at 1 kHz. Times are medians over runs that are interleaved engine by engine. */
+ * stepped at the rate of the hand: 1 kHz, and in small worlds 4 and 10 kHz. Times are medians over
+ * runs that are interleaved engine by engine. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -12,11 +13,13 @@
 
 #define PEERS_COLUMNS                                                           \
   "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode" \
-  ",iterations,peak_n,rest_mm,asleep,repeats"
+  ",iterations,peak_n,rest_mm,asleep,repeats,haptic_hz"
 
 #define REPEATS 5
 #define REPEATS_QUICK 3
-#define PEER_HZ 1000.0
+#define USUAL_HZ 1000.0
+#define RATE_HZ_LEAST 100.0
+#define RATE_HZ_MOST 20000.0
 #define TRUTH_ITERATIONS 1000
 #define TRUTH_BOXES_MOST 100 /* larger worlds take a truth too long */
 #define APART_TRUTH_BOXES 10 /* nothing but the floor touches the one that the hand meets */
@@ -46,16 +49,28 @@ static const world_plan plans[] = {
     {"mesh", {1}, 1},
 };
 
-/* A session, or an engine. */
+/* A world, and the rate of the hand. */
+typedef struct peers_case {
+  const char *world;
+  int bodies;
+  double haptic_hz;
+} peers_case;
+
+/* What runs at higher rates, too: one small world of each kind where bodies touch. */
+static const peers_case fast_cases[] = {
+    {"row", 10, 4000.0},  {"pile", 10, 4000.0},  {"tower", 8, 4000.0},  {"mesh", 1, 4000.0},
+    {"row", 10, 10000.0}, {"pile", 10, 10000.0}, {"tower", 8, 10000.0}, {"mesh", 1, 10000.0},
+};
+
+/* A session, or an engine, which is stepped at the rate of the hand. */
 typedef struct contestant {
   const peer_engine *engine; /* NULL: a session */
-  double physics_hz;
+  double physics_hz;         /* of a session */
 } contestant;
 
 typedef struct peers_row {
   const contestant *who;
-  const char *world;
-  int bodies;
+  peers_case of;
   double us_per_ms; /* medians */
   double p99_us;
   double error;     /* NaN: not known */
@@ -90,41 +105,50 @@ static void contestants_find(peers_bed *bed)
   bed->who[bed->who_count++].physics_hz = 60.0;
   bed->who[bed->who_count++].physics_hz = 20.0;
   for (size_t i = 0; (engine = peer_engine_at(i)) != NULL; ++i) {
-    bed->who[bed->who_count++] = (contestant){engine, PEER_HZ};
+    bed->who[bed->who_count++].engine = engine;
   }
 }
 
-static bool contestant_takes(const contestant *who, const char *world, int bodies)
+static bool contestant_takes(const contestant *who, const peers_case *of)
 {
-  return who->engine == NULL ||
-         (bodies <= who->engine->boxes_most && (who->engine->can_sleep || !world_sleeps(world)));
+  const peer_engine *engine = who->engine;
+  return engine == NULL || (of->bodies * of->haptic_hz <= engine->boxes_most * USUAL_HZ &&
+                            (engine->can_sleep || !world_sleeps(of->world)));
+}
+
+static double row_physics_hz(const peers_row *row)
+{
+  return row->who->engine != NULL ? row->of.haptic_hz : row->who->physics_hz;
 }
 
 /* ---- a case ---- */
 
-static hap_status contestant_run(bench *b, const contestant *who, const peer_world *world,
-                                 bool may_sleep, peers_run *out)
+static hap_status row_run(bench *b, const peers_row *row, const peer_world *world, peers_run *out)
 {
-  if (who->engine == NULL) {
-    return peers_run_session(b, world, who->physics_hz, may_sleep, out);
+  const peer_engine *engine = row->who->engine;
+  bool may_sleep = world_sleeps(row->of.world);
+  if (engine == NULL) {
+    peers_session_setting setting = {row->who->physics_hz, row->of.haptic_hz, may_sleep};
+    return peers_run_session(b, world, &setting, out);
   }
-  peer_setting setting = {1.0 / PEER_HZ, who->engine->iterations, may_sleep, false};
-  return peers_run_engine(b, who->engine, world, &setting, out);
+  peer_setting setting = {1.0 / row->of.haptic_hz, engine->iterations, may_sleep, false};
+  return peers_run_engine(b, engine, world, &setting, out);
 }
 
 /* Without one there is no force. */
-static hap_status truth_run(bench *b, const peer_engine *engine, const char *name, int bodies,
+static hap_status truth_run(bench *b, const peer_engine *engine, const peers_case *of,
                             peers_run *out)
 {
   peer_world world;
-  bool apart = strncmp(name, "apart", 5) == 0;
-  peer_setting setting = {1.0 / PEER_HZ, TRUTH_ITERATIONS, false, true};
+  bool apart = strncmp(of->world, "apart", 5) == 0;
+  peer_setting setting = {1.0 / of->haptic_hz, TRUTH_ITERATIONS, false, true};
   memset(out, 0, sizeof *out);
-  if (!apart && bodies > TRUTH_BOXES_MOST) {
+  if (!apart && of->bodies > TRUTH_BOXES_MOST) {
     return HAP_OK;
   }
-  if (!peer_world_create(apart ? "apart" : name, apart ? APART_TRUTH_BOXES : bodies, &world)) {
-    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %s", name);
+  if (!peer_world_create(apart ? "apart" : of->world, apart ? APART_TRUTH_BOXES : of->bodies,
+                         &world)) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %s", of->world);
   }
   hap_status status = peers_run_engine(b, engine, &world, &setting, out);
   peer_world_destroy(&world);
@@ -143,7 +167,7 @@ static hap_status row_judge(bench *b, const peer_world *world, const peers_run *
   }
   row->error = row->error_ode = peers_run_error(&row->run, ode_truth);
   if (engine != NULL && engine != &peer_ode) {
-    status = truth_run(b, engine, row->world, row->bodies, &truth);
+    status = truth_run(b, engine, &row->of, &truth);
     row->error = status >= HAP_OK ? peers_run_error(&row->run, &truth) : (double)NAN;
     peers_run_free(&truth);
   }
@@ -192,7 +216,7 @@ static hap_status case_time(bench *b, const peer_world *world, peers_row *rows, 
   hap_status status = HAP_OK;
   for (size_t n = 0; n < repeats; ++n) {
     for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
-      status = contestant_run(b, rows[i].who, world, world_sleeps(rows[i].world), &runs[i][n]);
+      status = row_run(b, &rows[i], world, &runs[i][n]);
     }
   }
   for (size_t i = 0; i < count; ++i) {
@@ -218,12 +242,12 @@ static void number_write(FILE *csv, double value)
 static void row_write(FILE *csv, const peers_row *r)
 {
   int iterations = r->who->engine != NULL ? r->who->engine->iterations : peer_ode.iterations;
-  fprintf(csv, "%s,%s,%d,%g,%.5g,%.5g", contestant_name(r->who), r->world, r->bodies,
-          r->who->physics_hz, r->us_per_ms, r->p99_us);
+  fprintf(csv, "%s,%s,%d,%g,%.5g,%.5g", contestant_name(r->who), r->of.world, r->of.bodies,
+          row_physics_hz(r), r->us_per_ms, r->p99_us);
   number_write(csv, r->error);
   number_write(csv, r->error_ode);
-  fprintf(csv, ",%d,%.5g,%.4g,%zu,%d\n", iterations, peers_run_peak(&r->run), 1e3 * r->run.rest,
-          r->run.asleep, r->repeats);
+  fprintf(csv, ",%d,%.5g,%.4g,%zu,%d,%g\n", iterations, peers_run_peak(&r->run), 1e3 * r->run.rest,
+          r->run.asleep, r->repeats, r->of.haptic_hz);
 }
 
 static void error_text(double error, char *out, size_t size)
@@ -240,13 +264,12 @@ static void row_report(bench *b, const peers_row *r)
   char error[32];
   char error_ode[32];
   char name[64];
-  bool sleeps = world_sleeps(r->world);
-  size_t asleep = sleeps ? (size_t)r->bodies : 0;
+  size_t asleep = world_sleeps(r->of.world) ? (size_t)r->of.bodies : 0;
   error_text(r->error, error, sizeof error);
   error_text(r->error_ode, error_ode, sizeof error_ode);
-  snprintf(name, sizeof name, "%s:%d, %s %g Hz", r->world, r->bodies, contestant_name(r->who),
-           r->who->physics_hz);
-  bench_say("%-30s %8.1f us a ms, p99 %8.1f us, force %s, of ODE's %s", name, r->us_per_ms,
+  snprintf(name, sizeof name, "%s:%d@%g, %s %g Hz", r->of.world, r->of.bodies, r->of.haptic_hz,
+           contestant_name(r->who), row_physics_hz(r));
+  bench_say("%-36s %8.1f us a ms, p99 %8.1f us, force %s, of ODE's %s", name, r->us_per_ms,
             r->p99_us, error, error_ode);
   if (b->verify) {
     bench_check(b, isnan(r->first) || fabs(r->first - 1.0) <= FIRST_WITHIN,
@@ -258,31 +281,32 @@ static void row_report(bench *b, const peers_row *r)
   }
 }
 
-static hap_status case_run(peers_bed *bed, FILE *csv, const char *name, int bodies)
+static hap_status case_run(peers_bed *bed, FILE *csv, const peers_case *of)
 {
   bench *b = bed->bench;
   peer_world world;
   peers_run ode_truth = {0};
   peers_row *rows = &bed->rows[bed->row_count];
   size_t count = 0;
-  if (!peer_world_create(name, bodies, &world)) {
-    return bench_fail(b, HAP_ERROR_ARGUMENT, "no world %s of %d boxes", name, bodies);
+  if (!peer_world_create(of->world, of->bodies, &world)) {
+    return bench_fail(b, HAP_ERROR_ARGUMENT, "no world %s of %d boxes", of->world, of->bodies);
   }
   for (size_t i = 0; i < bed->who_count; ++i) {
-    if (contestant_takes(&bed->who[i], name, bodies)) {
-      rows[count++] = (peers_row){.who = &bed->who[i], .world = name, .bodies = bodies};
+    if (contestant_takes(&bed->who[i], of)) {
+      rows[count++] = (peers_row){.who = &bed->who[i], .of = *of};
     } else {
-      bench_say("%s:%d without %s, which %s", name, bodies, contestant_name(&bed->who[i]),
-                world_sleeps(name) ? "does not sleep" : "would take too long");
+      bench_say("%s:%d@%g without %s, which %s", of->world, of->bodies, of->haptic_hz,
+                contestant_name(&bed->who[i]),
+                world_sleeps(of->world) ? "does not sleep" : "would take too long");
     }
   }
-  if (world_sleeps(name)) {
+  if (world_sleeps(of->world)) {
     world.hand.settle_s = SLEEP_SETTLE_S;
   }
   bed->row_count += count;
   hap_status status = case_time(b, &world, rows, count);
   if (status >= HAP_OK) {
-    status = truth_run(b, &peer_ode, name, bodies, &ode_truth);
+    status = truth_run(b, &peer_ode, of, &ode_truth);
   }
   for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
     status = row_judge(b, &world, &ode_truth, &rows[i]);
@@ -297,14 +321,14 @@ static hap_status case_run(peers_bed *bed, FILE *csv, const char *name, int bodi
 /* Forces of all ticks, where there are few worlds. */
 static hap_status forces_write(const peers_bed *bed)
 {
-  FILE *csv =
-      bench_csv_open(bed->bench, "peers_trace", "engine,world,bodies,physics_hz,tick,fx,fy,fz");
+  FILE *csv = bench_csv_open(bed->bench, "peers_trace",
+                             "engine,world,bodies,physics_hz,tick,fx,fy,fz,haptic_hz");
   for (size_t i = 0; csv != NULL && i < bed->row_count; ++i) {
     const peers_row *r = &bed->rows[i];
     for (size_t n = 0; n < r->run.count; ++n) {
       const double *f = r->run.force[n];
-      fprintf(csv, "%s,%s,%d,%g,%zu,%.6g,%.6g,%.6g\n", contestant_name(r->who), r->world, r->bodies,
-              r->who->physics_hz, n, f[0], f[1], f[2]);
+      fprintf(csv, "%s,%s,%d,%g,%zu,%.6g,%.6g,%.6g,%g\n", contestant_name(r->who), r->of.world,
+              r->of.bodies, row_physics_hz(r), n, f[0], f[1], f[2], r->of.haptic_hz);
     }
   }
   return bench_csv_close(bed->bench, csv, HAP_OK);
@@ -312,9 +336,16 @@ static hap_status forces_write(const peers_bed *bed)
 
 /* ---- pictures ---- */
 
-static bool row_is(const peers_row *r, const contestant *who, const char *world)
+static double bed_hz(const peers_bed *bed)
 {
-  return r->who == who && strcmp(r->world, world) == 0;
+  return bed->row_count > 0 ? bed->rows[0].of.haptic_hz : USUAL_HZ;
+}
+
+/* Of the rate of the first row: other rates are in the table alone. */
+static bool row_is(const peers_bed *bed, const peers_row *r, size_t who, size_t plan)
+{
+  return r->who == &bed->who[who] && strcmp(r->of.world, plans[plan].name) == 0 &&
+         r->of.haptic_hz == bed_hz(bed);
 }
 
 static void costs_data(FILE *script, const peers_bed *bed, size_t who, size_t plan)
@@ -322,8 +353,8 @@ static void costs_data(FILE *script, const peers_bed *bed, size_t who, size_t pl
   fprintf(script, "$c%zu_%zu << EOD\n", plan, who);
   for (size_t i = 0; i < bed->row_count; ++i) {
     const peers_row *r = &bed->rows[i];
-    if (row_is(r, &bed->who[who], plans[plan].name)) {
-      fprintf(script, "%d %g %g\n", r->bodies, r->us_per_ms, r->p99_us);
+    if (row_is(bed, r, who, plan)) {
+      fprintf(script, "%d %g %g\n", r->of.bodies, r->us_per_ms, r->p99_us);
     }
   }
   fprintf(script, "EOD\n");
@@ -334,7 +365,7 @@ static size_t costs_count(const peers_bed *bed, size_t who, size_t plan)
 {
   size_t count = 0;
   for (size_t i = 0; i < bed->row_count; ++i) {
-    count += row_is(&bed->rows[i], &bed->who[who], plans[plan].name);
+    count += row_is(bed, &bed->rows[i], who, plan);
   }
   return count;
 }
@@ -386,7 +417,7 @@ static void costs_draw(FILE *script, const void *data)
 static const peers_row *force_row(const peers_bed *bed, size_t who, size_t plan)
 {
   for (size_t i = 0; i < bed->row_count; ++i) {
-    if (row_is(&bed->rows[i], &bed->who[who], plans[plan].name)) {
+    if (row_is(bed, &bed->rows[i], who, plan)) {
       return &bed->rows[i];
     }
   }
@@ -401,7 +432,7 @@ static void forces_draw(FILE *script, const void *data)
       const peers_row *r = force_row(bed, who, plan);
       fprintf(script, "$f%zu_%zu << EOD\n", plan, who);
       for (size_t i = 0; r != NULL && i < r->run.count; ++i) {
-        fprintf(script, "%zu %g\n", i, -r->run.force[i][0]);
+        fprintf(script, "%g %g\n", 1e3 * r->run.tick_s * (double)i, -r->run.force[i][0]);
       }
       fprintf(script, "EOD\n");
     }
@@ -417,12 +448,12 @@ static void forces_draw(FILE *script, const void *data)
     if (first == NULL) {
       continue;
     }
-    fprintf(script, "set title '%s:%d' noenhanced\n", first->world, first->bodies);
+    fprintf(script, "set title '%s:%d' noenhanced\n", first->of.world, first->of.bodies);
     for (size_t who = 0; who < bed->who_count; ++who) {
       if (force_row(bed, who, plan) != NULL) {
         fprintf(script, "%s $f%zu_%zu using 1:2 with lines lt %zu title '%s %g Hz'",
                 any ? "," : "plot", plan, who, who + 1, contestant_name(&bed->who[who]),
-                bed->who[who].physics_hz);
+                row_physics_hz(force_row(bed, who, plan)));
         any = true;
       }
     }
@@ -433,27 +464,46 @@ static void forces_draw(FILE *script, const void *data)
 
 /* ---- the program ---- */
 
-static hap_status plan_run(peers_bed *bed, FILE *csv, const world_plan *plan)
+static hap_status plan_run(peers_bed *bed, FILE *csv, const world_plan *plan, double haptic_hz)
 {
   hap_status status = HAP_OK;
   for (int i = 0; i < SIZES_MOST && plan->sizes[i] > 0 && status >= HAP_OK; ++i) {
+    peers_case of = {plan->name, plan->sizes[i], haptic_hz};
     if (!bed->bench->quick || plan->sizes[i] <= plan->quick_most) {
-      status = case_run(bed, csv, plan->name, plan->sizes[i]);
+      status = case_run(bed, csv, &of);
     }
   }
   return status;
 }
 
-/* NAME or NAME:N, a world of the plans. */
+/* What follows a mark in "NAME[:N][@HZ]"; false: it is no number of that range. */
+static bool number_after(const char *text, char mark, double least, double most, double *io)
+{
+  const char *at = strchr(text, mark);
+  char *end;
+  if (at == NULL) {
+    return true;
+  }
+  *io = strtod(at + 1, &end);
+  return end > at + 1 && (*end == '\0' || *end == '@') && *io >= least && *io <= most;
+}
+
+/* A world of the plans, all sizes or one, at 1 kHz or another rate. */
 static hap_status scene_run(peers_bed *bed, FILE *csv, const char *scene)
 {
-  size_t length = strcspn(scene, ":");
+  size_t length = strcspn(scene, ":@");
+  double bodies = 0.0;
+  double haptic_hz = USUAL_HZ;
+  if (!number_after(scene, ':', 1.0, 1e5, &bodies) ||
+      !number_after(scene, '@', RATE_HZ_LEAST, RATE_HZ_MOST, &haptic_hz)) {
+    return bench_fail(bed->bench, HAP_ERROR_ARGUMENT, "--scene %s: NAME[:N][@HZ], %g to %g Hz",
+                      scene, RATE_HZ_LEAST, RATE_HZ_MOST);
+  }
   for (size_t i = 0; i < BENCH_COUNT(plans); ++i) {
     const char *name = plans[i].name;
     if (strncmp(name, scene, length) == 0 && name[length] == '\0') {
-      return scene[length] == ':'
-                 ? case_run(bed, csv, name, (int)strtol(scene + length + 1, NULL, 10))
-                 : plan_run(bed, csv, &plans[i]);
+      peers_case of = {name, (int)bodies, haptic_hz};
+      return of.bodies > 0 ? case_run(bed, csv, &of) : plan_run(bed, csv, &plans[i], haptic_hz);
     }
   }
   return bench_fail(bed->bench, HAP_ERROR_ARGUMENT, "no world %s", scene);
@@ -466,7 +516,10 @@ static hap_status worlds_run(peers_bed *bed, FILE *csv)
     return scene_run(bed, csv, bed->bench->scene);
   }
   for (size_t i = 0; i < BENCH_COUNT(plans) && status >= HAP_OK; ++i) {
-    status = plan_run(bed, csv, &plans[i]);
+    status = plan_run(bed, csv, &plans[i], USUAL_HZ);
+  }
+  for (size_t i = 0; i < BENCH_COUNT(fast_cases) && status >= HAP_OK; ++i) {
+    status = case_run(bed, csv, &fast_cases[i]);
   }
   return status;
 }

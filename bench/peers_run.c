@@ -15,15 +15,16 @@
 
 #define MAX_FORCE 200.0 /* N: nothing limits the hand */
 
-static size_t settle_ticks(const peer_world *world)
+static size_t settle_ticks(const peer_world *world, double tick_s)
 {
-  return (size_t)lround(world->hand.settle_s / PEERS_TICK_S);
+  return (size_t)lround(world->hand.settle_s / tick_s);
 }
 
-static hap_status run_create(bench *b, const peer_world *world, peers_run *out)
+static hap_status run_create(bench *b, const peer_world *world, double tick_s, peers_run *out)
 {
   memset(out, 0, sizeof *out);
-  out->count = (size_t)lround(world->hand.seconds / PEERS_TICK_S);
+  out->tick_s = tick_s;
+  out->count = (size_t)lround(world->hand.seconds / tick_s);
   out->force = calloc(out->count, sizeof *out->force);
   out->tick_us = calloc(out->count, sizeof *out->tick_us);
   if (out->force == NULL || out->tick_us == NULL) {
@@ -54,7 +55,7 @@ static double way_from(const double a[3], const double b[3])
 
 static void run_note_use(peers_run *run, double used_s)
 {
-  run->us_per_ms = 1e6 * used_s / (1e3 * PEERS_TICK_S * (double)run->count);
+  run->us_per_ms = 1e6 * used_s / (1e3 * run->tick_s * (double)run->count);
 }
 
 /* ---- an engine ---- */
@@ -88,21 +89,21 @@ hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_worl
 {
   double ignored[3];
   peer_reach reach;
-  hap_status status = run_create(b, world, out);
+  hap_status status = run_create(b, world, setting->step_s, out);
   void *sim = status >= HAP_OK ? engine->create(world, setting) : NULL;
   if (sim == NULL) {
     return bench_fail(b, HAP_ERROR_MEMORY, "%s could not build the world", engine->name);
   }
-  size_t settle = settle_ticks(world);
+  size_t settle = settle_ticks(world, out->tick_s);
   peer_reach_find(world, &reach);
   for (size_t i = 0; i < settle; ++i) {
-    engine_tick(engine, sim, world, &reach, PEERS_TICK_S * (double)i, ignored);
+    engine_tick(engine, sim, world, &reach, out->tick_s * (double)i, ignored);
   }
   engine_rest(engine, sim, world, out);
   double used = bench_used_seconds();
   for (size_t i = 0; i < out->count; ++i) {
     double begin = wall_us();
-    engine_tick(engine, sim, world, &reach, PEERS_TICK_S * (double)(settle + i), out->force[i]);
+    engine_tick(engine, sim, world, &reach, out->tick_s * (double)(settle + i), out->force[i]);
     out->tick_us[i] = wall_us() - begin;
   }
   run_note_use(out, bench_used_seconds() - used);
@@ -114,6 +115,7 @@ hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_worl
 
 typedef struct session_bed {
   const peer_world *world;
+  const peers_session_setting *setting;
   peer_ode_world ode;
   hap_session *session;
   hap_pointer_id hand;
@@ -127,7 +129,7 @@ static bool session_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters
   return peer_ode_collides(bed->world, a, b);
 }
 
-static hap_status session_open(bench *b, double physics_hz, size_t ticks, session_bed *bed)
+static hap_status session_open(bench *b, size_t ticks, session_bed *bed)
 {
   hap_session_def def;
   hap_expert_def expert;
@@ -141,7 +143,8 @@ static hap_status session_open(bench *b, double physics_hz, size_t ticks, sessio
   hap_ode_def_init(&ode, sizeof ode);
   hap_pointer_def_init(&pointer, sizeof pointer);
   def.drive = HAP_DRIVE_LOCKSTEP;
-  def.physics_hz = physics_hz;
+  def.physics_hz = bed->setting->physics_hz;
+  def.haptic_hz = bed->setting->haptic_hz;
   expert.trace_rows = (int32_t)ticks;
   def.expert = &expert;
   research.guard = HAP_GUARD_MEASURE; /* the hand is a prescribed motion */
@@ -167,7 +170,7 @@ static hap_status session_tick(bench *b, session_bed *bed, size_t tick, double o
   hap_pose pose = {.quat_wxyz = {1.0}};
   hap_twist twist = {{0.0}, {0.0}};
   hap_pointer_state state = {0};
-  double t = PEERS_TICK_S * (double)tick;
+  double t = (double)tick / bed->setting->haptic_hz;
   peer_hand_at(&bed->world->hand, t, pose.position, twist.linear);
   hap_status status = hap_pointer_set_target(bed->session, bed->hand, &pose, &twist);
   if (status >= HAP_OK && tick == 0) {
@@ -207,12 +210,12 @@ static hap_status session_times(bench *b, const session_bed *bed, peers_run *out
   return HAP_OK;
 }
 
-static hap_status session_run(bench *b, session_bed *bed, double physics_hz, peers_run *out)
+static hap_status session_run(bench *b, session_bed *bed, peers_run *out)
 {
   double ignored[3];
-  size_t settle = settle_ticks(bed->world);
+  size_t settle = settle_ticks(bed->world, out->tick_s);
   size_t ticks = settle > out->count ? settle : out->count;
-  hap_status status = session_open(b, physics_hz, ticks, bed);
+  hap_status status = session_open(b, ticks, bed);
   for (size_t i = 0; i < settle && status >= HAP_OK; ++i) {
     status = session_tick(b, bed, i, ignored);
   }
@@ -232,18 +235,18 @@ static hap_status session_run(bench *b, session_bed *bed, double physics_hz, pee
   return status;
 }
 
-hap_status peers_run_session(bench *b, const peer_world *world, double physics_hz, bool may_sleep,
-                             peers_run *out)
+hap_status peers_run_session(bench *b, const peer_world *world,
+                             const peers_session_setting *setting, peers_run *out)
 {
-  session_bed bed = {.world = world};
-  hap_status status = run_create(b, world, out);
+  session_bed bed = {.world = world, .setting = setting};
+  hap_status status = run_create(b, world, 1.0 / setting->haptic_hz, out);
   bed.rows = status >= HAP_OK ? calloc(out->count, sizeof *bed.rows) : NULL;
   if (status >= HAP_OK &&
-      (bed.rows == NULL || !peer_ode_world_create(world, may_sleep, &bed.ode))) {
+      (bed.rows == NULL || !peer_ode_world_create(world, setting->may_sleep, &bed.ode))) {
     status = bench_fail(b, HAP_ERROR_MEMORY, "no memory for a world of %zu boxes", world->count);
   }
   if (status >= HAP_OK) {
-    status = session_run(b, &bed, physics_hz, out);
+    status = session_run(b, &bed, out);
   }
   hap_session_destroy(bed.session);
   peer_ode_world_destroy(&bed.ode);
@@ -290,7 +293,7 @@ double peers_run_first(const peer_world *world, const peers_run *run)
   for (size_t i = 0; i < run->count; ++i) {
     double at[3];
     double velocity[3];
-    peer_hand_at(hand, hand->settle_s + PEERS_TICK_S * (double)i, at, velocity);
+    peer_hand_at(hand, hand->settle_s + run->tick_s * (double)i, at, velocity);
     if (at[0] + hand->radius >= PEERS_FIRST_DEPTH) { /* the face is at x = 0 */
       return force_of(run->force[i]);
     }

@@ -3,15 +3,14 @@
 #ifndef HAPODE_BENCH_PEERS_RUN_H
 #define HAPODE_BENCH_PEERS_RUN_H
 
-/* One run of hapode-bench peers: a world, the hand's whole path, an engine at 1 kHz or a session.
- */
+/* One run of hapode-bench peers: a world, the hand's whole path, an engine at the rate of the hand
+ * or a session. */
 
 #include "bench/bench.h"
 #include "bench/peer.h"
 
-#define PEERS_TICK_S 0.001
-
 typedef struct peers_run {
+  double tick_s;
   size_t count;       /* ticks, from the end of settling on */
   double (*force)[3]; /* N, on the hand, in each of them */
   double *tick_us;    /* us, wall clock: of each step of the engine or tick of the session */
@@ -23,9 +22,15 @@ typedef struct peers_run {
 hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_world *world,
                             const peer_setting *setting, peers_run *out);
 
+typedef struct peers_session_setting {
+  double physics_hz;
+  double haptic_hz;
+  bool may_sleep;
+} peers_session_setting;
+
 /* Model CONTACT at all defaults, in drive LOCKSTEP: everything is done by the calling thread. */
-hap_status peers_run_session(bench *b, const peer_world *world, double physics_hz, bool may_sleep,
-                             peers_run *out);
+hap_status peers_run_session(bench *b, const peer_world *world,
+                             const peers_session_setting *setting, peers_run *out);
 
 void peers_run_free(peers_run *run); /* zeroed allowed */
 

@@ -131,7 +131,7 @@ static hap_status create_session(bench *b, port *p, const port_def *def)
   research.guard = HAP_GUARD_MEASURE;
   session.model = def->model;
   session.physics_hz = PORT_PHYSICS_HZ;
-  session.haptic_hz = PORT_HAPTIC_HZ;
+  session.haptic_hz = def->haptic_hz > 0.0 ? def->haptic_hz : PORT_HAPTIC_HZ;
   session.max_pointers = 1;
   session.max_bodies = 1;
   session.max_contacts = 16;

@@ -39,6 +39,7 @@ typedef struct port_def {
   port_body body;
   double mass;        /* kg, of the body */
   const char *device; /* spec */
+  double haptic_hz;   /* 0: PORT_HAPTIC_HZ */
   hap_model model;
   hap_coupling coupling;
   double coupling_stiffness; /* N/m; 0: from the device's figures */

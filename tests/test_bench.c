@@ -220,7 +220,8 @@ TEST(impedance_is_that_of_the_closed_forms)
                    "phase_error_deg,residual,contact_share,error_sampled") == 6 * 5 * 10);
   CHECK(table_rows("zwidth",
                    "device,mass,damping,delay,wall_damping,direct_stiffness,linear_stiffness,"
-                   "passive_stiffness,coupling_stiffness,proxy_stiffness,proxy_felt") == 4 * 4);
+                   "passive_stiffness,coupling_stiffness,proxy_stiffness,proxy_felt,haptic_hz") ==
+        4 * 4);
   check_picture("impedance");
   check_picture("zwidth");
 }

@@ -177,11 +177,12 @@ TEST(first_forces_are_alike)
   peer_world world;
   peers_run run;
   peers_run ode;
+  const peers_session_setting session = {.physics_hz = 60.0, .haptic_hz = 1000.0};
   REQUIRE(peer_world_create("row", 4, &world));
   REQUIRE(peers_run_engine(&b, &peer_ode, &world, &plain_setting, &ode) >= HAP_OK);
   double wanted = peers_run_first(&world, &ode);
   CHECK(wanted > 0.3 && wanted < 0.7); /* 0.4 N of the spring, and its damper */
-  REQUIRE(peers_run_session(&b, &world, 60.0, false, &run) >= HAP_OK);
+  REQUIRE(peers_run_session(&b, &world, &session, &run) >= HAP_OK);
   CHECK_NEAR(peers_run_first(&world, &run), wanted, 0.1 * wanted);
   CHECK(peers_run_error(&run, &ode) < 0.02);
   CHECK(run.asleep == 0 && run.us_per_ms > 0.0);
@@ -218,7 +219,7 @@ TEST(boxes_sleep_where_they_may)
 
 #define COLUMNS                                                                             \
   "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode,iterations," \
-  "peak_n,rest_mm,asleep,repeats\n"
+  "peak_n,rest_mm,asleep,repeats,haptic_hz\n"
 
 TEST(the_program_leaves_its_table)
 {
@@ -240,10 +241,43 @@ TEST(the_program_leaves_its_table)
   CHECK(file_exists(folder_path("peers_trace.csv")));
 }
 
+/* The first force is that of 1 kHz: spring and damper of the hand do not know of ticks. */
+TEST(a_hand_of_4_khz_has_the_same_first_force)
+{
+  bench b = {.out = "."};
+  peer_world world;
+  peers_run run;
+  peers_run ode;
+  const peers_session_setting session = {.physics_hz = 60.0, .haptic_hz = 4000.0};
+  peer_setting fast = plain_setting;
+  fast.step_s = 1.0 / session.haptic_hz;
+  REQUIRE(peer_world_create("row", 4, &world));
+  REQUIRE(peers_run_engine(&b, &peer_ode, &world, &plain_setting, &ode) >= HAP_OK);
+  double wanted = peers_run_first(&world, &ode);
+  size_t ticks = ode.count;
+  peers_run_free(&ode);
+  REQUIRE(peers_run_engine(&b, &peer_ode, &world, &fast, &ode) >= HAP_OK);
+  REQUIRE(peers_run_session(&b, &world, &session, &run) >= HAP_OK);
+  CHECK(ode.count == 4 * ticks && run.count == 4 * ticks);
+  CHECK_NEAR(peers_run_first(&world, &ode), wanted, 0.1 * wanted);
+  CHECK_NEAR(peers_run_first(&world, &run), wanted, 0.1 * wanted);
+  CHECK(peers_run_error(&run, &ode) < 0.02);
+  peers_run_free(&run);
+  peers_run_free(&ode);
+  peer_world_destroy(&world);
+}
+
 TEST(the_program_knows_its_worlds)
 {
   CHECK(run("peers --scene rows --out %s", test_folder) == 1);
   CHECK(run("peers --scene row:0 --out %s", test_folder) == 1);
+  CHECK(run("peers --scene row:4x --out %s", test_folder) == 1);
+  CHECK(run("peers --scene row:4@ --out %s", test_folder) == 1);
+  CHECK(run("peers --scene row:4@50 --out %s", test_folder) == 1);
+  REQUIRE(run("peers --quick --scene chain:10@4000 --out %s", test_folder) == 0);
+  const char *text = file_text(folder_path("peers.csv"));
+  CHECK(lines_with(text, "hapode,chain,10,60,") == 1);
+  CHECK(lines_with(text, "ode,chain,10,4000,") == 1);
 }
 
 SET_UP
