@@ -27,10 +27,17 @@ static hap_status device_identify(hap_device *device, hap_device_identity *out, 
 
 static hap_status identify_spec(const char *spec, hap_device_identity *out, hap_detail *detail)
 {
-  hap_device *device = NULL;
-  hap_status status = hap_device_open(spec, &device, detail);
-  status = status < HAP_OK ? status : device_identify(device, out, detail);
-  hap_device_close(device);
+  hap_status status;
+  bool late;
+  int left = 50;
+  do { /* a busy machine may stop this thread for as long as the watchdog waits */
+    hap_device *device = NULL;
+    detail->text[0] = '\0';
+    status = hap_device_open(spec, &device, detail);
+    status = status < HAP_OK ? status : device_identify(device, out, detail);
+    hap_device_close(device);
+    late = status < HAP_OK && strstr(detail->text, "did not come back from a call") != NULL;
+  } while (late && --left > 0);
   return status;
 }
 
