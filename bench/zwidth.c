@@ -484,9 +484,10 @@ hap_status zwidth_run(bench *b)
 {
   zwidth_tables tables;
   hap_status status = HAP_OK;
+  const size_t count = b->quick ? 1 : RATES;
   memset(&tables, 0, sizeof tables);
-  tables.count = b->quick ? 1 : RATES;
-  for (size_t i = 0; i < tables.count && status >= HAP_OK; ++i) {
+  tables.count = count;
+  for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
     tables.of[i].tick_s = 1.0 / rates[i];
     tables.of[i].walls = b->quick ? (WALLS_MAX + 2) / 3 : WALLS_MAX;
     status = rate_run(b, &tables.of[i]);

@@ -135,9 +135,10 @@ bool shape_make_cone(int steps, shape_mesh *out)
       float wide = r == 3 ? 0.0F : 1.0F;
       float side[3] = {cosf(angle), sinf(angle), 0.5F};
       const float base[3] = {0.0F, 0.0F, -1.0F};
+      const float centre[3] = {0.0F, 0.0F, 0.0F};
       const float offset[3] = {wide * cosf(angle), wide * sinf(angle), r == 3 ? 1.0F : 0.0F};
       view_normalize(side);
-      vertex_add(out, r < 2 ? base : side, r == 0 ? (const float[3]){0} : offset);
+      vertex_add(out, r < 2 ? base : side, r == 0 ? centre : offset);
     }
   }
   rings_join(out, 4, around);
