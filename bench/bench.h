@@ -41,6 +41,7 @@ typedef struct bench {
 typedef hap_status (*bench_fn)(bench *b);
 
 hap_status bench_accuracy(bench *b);
+hap_status bench_app(bench *b);
 hap_status bench_couplings(bench *b);
 hap_status bench_edits(bench *b);
 hap_status bench_effects(bench *b);

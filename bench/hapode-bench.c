@@ -29,6 +29,10 @@ static const program programs[] = {
      "FILE...: the\n"
      "             table of all of them; --fresh: not from what a run that was killed has "
      "finished"},
+    {"app", bench_app,
+     "what an application is promised: forces, textures, vibrations, taps, settings, each against "
+     "SINGLE\n"
+     "             and a plain loop or a closed form"},
     {"couplings", bench_couplings,
      "direct and proxy against god-object and virtual coupling: force, depth, stability, drag"},
     {"edits", bench_edits,

@@ -197,6 +197,14 @@ TEST(poses_are_drawn_within_their_bound)
   check_picture("poses");
 }
 
+TEST(what_an_application_is_promised_holds)
+{
+  CHECK(bench_run("app --verify --quick") == 0);
+  CHECK(said_lines("app: 0 off") == 1);
+  CHECK(table_rows("app", "number,case,model,physics_hz,haptic_hz,against,value,bound,unit") >=
+        100);
+}
+
 TEST(couplings_are_side_by_side)
 {
   CHECK(bench_run("couplings --verify --quick") == 0);
