@@ -1,26 +1,24 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#define _POSIX_C_SOURCE 200809L /* nanosleep */
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 #include <stdio.h>
-#include <time.h>
 
 int main(void)
 {
   dInitODE2(0);
-  dWorldID world = dWorldCreate();
-  dSpaceID space = dHashSpaceCreate(NULL);
-
   hap_detail why = {""};
   hap_session *session;
   hap_pointer_id hand;
+  hap_session_def session_def;
   hap_ode_def ode_def;
   hap_pointer_def hand_def;
+  hap_session_def_init(&session_def, sizeof session_def);
   hap_ode_def_init(&ode_def, sizeof ode_def);
-  ode_def.world = world, ode_def.space = space;
+  session_def.drive = HAP_DRIVE_LOCKSTEP; /* no clock: the program ends at once */
+  ode_def.world = dWorldCreate(), ode_def.space = dHashSpaceCreate(NULL);
   hap_pointer_def_init(&hand_def, sizeof hand_def);
-  if (hap_session_create(NULL, &ode_def, &session, &why) < HAP_OK ||
+  if (hap_session_create(&session_def, &ode_def, &session, &why) < HAP_OK ||
       hap_device_open("virtual:path=0:0/0.004/0;2:0.06/0.004/0", &hand_def.device, &why) < HAP_OK ||
       hap_pointer_add(session, &hand_def, &hand) < HAP_OK) {
     return fprintf(stderr, "%s\n", why.text), 1;
@@ -55,7 +53,9 @@ int main(void)
   }
   for (int frame = 0; frame < 120; ++frame) {
     hap_pointer_state state;
-    nanosleep(&(struct timespec){.tv_nsec = 16666667}, NULL);
+    if (hap_session_advance(session, 17) < HAP_OK) { /* ticks of 1 ms */
+      return 1;
+    }
     hap_pointer_get(session, hand, &state, sizeof state);
     if (frame % 6 == 0) {
       printf("%4.1f mm: %5.2f N along, %5.2f N to the rail\n", 1e3 * state.proxy.position[0],
