@@ -41,15 +41,13 @@ int main(void)
   make_cube();
 
   hap_detail why = {""};
-  hap_session_def session_def;
   hap_ode_def ode_def;
   hap_pointer_def hand_def;
-  hap_session_def_init(&session_def, sizeof session_def);
   hap_ode_def_init(&ode_def, sizeof ode_def);
   hap_pointer_def_init(&hand_def, sizeof hand_def);
   ode_def.world = world, ode_def.space = space;
   hap_pointer_id hand;
-  if (hap_session_create(&session_def, &ode_def, &session, &why) < HAP_OK ||
+  if (hap_session_create(NULL, &ode_def, &session, &why) < HAP_OK ||
       hap_device_open("virtual:sine=0.04/0/0,hz=1", &hand_def.device, &why) < HAP_OK ||
       hap_pointer_add(session, &hand_def, &hand) < HAP_OK || hap_session_start(session) < HAP_OK) {
     return fprintf(stderr, "%s\n", why.text), 1;

@@ -21,13 +21,12 @@ static void pupil_guide(void *user, const hap_force_tick *tick, hap_wrench *out)
 {
   lesson *l = user;
   const hap_force_hand *hand = tick->hands[tick->self];
-  double off2 = 0.0;
+  l->off = 0.0;
   for (int i = 0; i < 3; ++i) {
     double way = l->way[l->at][i] - hand->pose.position[i];
     out->force[i] = l->stiffness * way - l->damping * hand->twist.linear[i];
-    off2 += way * way;
+    l->off = hypot(l->off, way);
   }
-  l->off = sqrt(off2);
   l->at += l->off < 0.01 && l->at + 1 < TICKS;
 }
 
@@ -63,9 +62,7 @@ static int hand_run(const char *device, lesson *l, int is_teacher)
     if (is_teacher) {
       memcpy(l->way[i], state.proxy.position, sizeof l->way[i]);
     } else if (i % 200 == 199) {
-      printf("%4d ms: at %5.1f %5.1f mm, %3d %% of the way, %4.1f mm off\n", i + 1,
-             1e3 * state.proxy.position[0], 1e3 * state.proxy.position[1], 100 * l->at / TICKS,
-             1e3 * l->off);
+      printf("%4d ms: %3d %% of the way, %4.1f mm off\n", i + 1, 100 * l->at / TICKS, 1e3 * l->off);
     }
   }
   hap_session_destroy(session);

@@ -9,6 +9,7 @@
 static void world_build(hap_ode_def *ode) /* the same world for both runs */
 {
   dMass mass;
+  hap_ode_def_init(ode, sizeof *ode);
   ode->world = dWorldCreate(), ode->space = dHashSpaceCreate(NULL);
   dBodyID cube = dBodyCreate(ode->world);
   dMassSetBoxTotal(&mass, 0.2, 0.05, 0.05, 0.05);
@@ -18,24 +19,19 @@ static void world_build(hap_ode_def *ode) /* the same world for both runs */
 
 static hap_status push_record(const char *path, hap_detail *why)
 {
-  hap_session_def def;
   hap_ode_def ode;
   hap_pointer_def hand;
   hap_record_def file;
   hap_session *session;
-  hap_pointer_id id;
-  hap_session_def_init(&def, sizeof def);
-  hap_ode_def_init(&ode, sizeof ode);
   hap_pointer_def_init(&hand, sizeof hand);
   hap_record_def_init(&file, sizeof file);
   file.path = path;
   world_build(&ode);
-  hap_status status = hap_session_create(&def, &ode, &session, why);
-  if (status >= HAP_OK) {
-    status = hap_device_open("virtual:path=0:-0.05/0/0;0.5:0.05/0/0", &hand.device, why);
-  }
-  if (status < HAP_OK || (status = hap_session_record(session, &file, why)) < HAP_OK ||
-      (status = hap_pointer_add(session, &hand, &id)) < HAP_OK ||
+  hap_status status = hap_session_create(NULL, &ode, &session, why);
+  const char *device = "virtual:path=0:-0.05/0/0;0.5:0.05/0/0";
+  if (status < HAP_OK || (status = hap_device_open(device, &hand.device, why)) < HAP_OK ||
+      (status = hap_session_record(session, &file, why)) < HAP_OK ||
+      (status = hap_pointer_add(session, &hand, &(hap_pointer_id){0})) < HAP_OK ||
       (status = hap_session_start(session)) < HAP_OK) {
     return status;
   }
@@ -56,7 +52,6 @@ static hap_status push_play(const char *path, hap_detail *why)
   hap_session_def_init(&def, sizeof def);
   hap_expert_def_init(&expert, sizeof expert);
   hap_research_def_init(&research, sizeof research);
-  hap_ode_def_init(&ode, sizeof ode);
   world_build(&ode);
   hap_status status = hap_player_open(path, HAP_PLAY_WHOLE, &player, why);
   if (status < HAP_OK || (status = hap_player_get_def(player, &def, &expert, &research)) < HAP_OK ||
@@ -79,9 +74,7 @@ int main(int argc, char **argv)
   hap_detail why = {""};
   dInitODE2(0);
   hap_status status = push_record(path, &why);
-  if (status >= HAP_OK) {
-    status = push_play(path, &why);
-  }
+  status = status < HAP_OK ? status : push_play(path, &why);
   puts(status == HAP_END ? "the replay is the recording" : hap_status_text(status));
   return status == HAP_END ? 0 : (fprintf(stderr, "%s\n", why.text), 1);
 }

@@ -40,7 +40,6 @@ static hap_status grains_make(hap_session *session, uint32_t *out)
 int main(void)
 {
   dInitODE2(0);
-  dWorldID world = dWorldCreate();
   dSpaceID space = dHashSpaceCreate(NULL);
   for (int i = 0; i < 3; ++i) { /* three tiles in a row, their tops at z = 0 */
     dGeomID tile = dCreateBox(space, 0.1, 0.1, 0.02);
@@ -58,7 +57,7 @@ int main(void)
   hap_ode_def_init(&ode_def, sizeof ode_def);
   hap_pointer_def_init(&hand_def, sizeof hand_def);
   session_def.drive = HAP_DRIVE_LOCKSTEP; /* no clock: the program ends at once */
-  ode_def.world = world, ode_def.space = space;
+  ode_def.world = dWorldCreate(), ode_def.space = space;
   ode_def.pointer_surface = surface_feel, ode_def.user = &grains;
   const char *path = "virtual:path=0:-0.04/0/0.02;0.3:-0.04/0/0.007;2.7:0.24/0/0.007"; /* stroke */
   if (hap_session_create(&session_def, &ode_def, &session, &why) < HAP_OK ||
