@@ -25,9 +25,29 @@ void view_strips_init(view_strips *strips, double seconds)
   }
 }
 
+/* Forgets the oldest bins. */
+static void bins_shift(view_strips *io, size_t by)
+{
+  float *const all[] = {io->force, io->tick_us, io->tick_weight};
+  by = by < VIEW_BINS ? by : VIEW_BINS;
+  for (size_t i = 0; i < sizeof all / sizeof all[0]; ++i) {
+    memmove(all[i], all[i] + by, (VIEW_BINS - by) * sizeof(float));
+    for (size_t k = VIEW_BINS - by; k < VIEW_BINS; ++k) {
+      all[i][k] = all[i] == io->tick_weight ? 0.0F : -1.0F;
+    }
+  }
+}
+
 void view_strips_add(view_strips *strips, double t, double force_n, double tick_us)
 {
-  double place = strips->seconds > 0.0 ? t / strips->seconds * VIEW_BINS : 0.0;
+  const double bin_s = strips->seconds / VIEW_BINS;
+  const double late = t - strips->begin - strips->seconds;
+  if (late >= bin_s && bin_s > 0.0) {
+    const double by = ceil(late / bin_s);
+    bins_shift(strips, by < VIEW_BINS ? (size_t)by : VIEW_BINS);
+    strips->begin += by * bin_s;
+  }
+  double place = bin_s > 0.0 ? (t - strips->begin) / bin_s : 0.0;
   int bin = place < 0.0 ? 0 : place < VIEW_BINS ? (int)place : VIEW_BINS - 1;
   float weight = strips->tick_weight[bin];
   float mean = weight > 0.0F ? strips->tick_us[bin] : 0.0F;
@@ -175,7 +195,7 @@ void strips_draw(ink *io, const view_strips *strips, double t, const int size[2]
   const float top = (float)size[1] * (1.0F - strips_share(size[1]));
   const float bottom = (float)size[1] - gap;
   const float middle = 0.5F * (float)size[0];
-  const double share = strips->seconds > 0.0 ? t / strips->seconds : 0.0;
+  const double share = strips->seconds > 0.0 ? (t - strips->begin) / strips->seconds : 0.0;
   const float now = (float)fmin(fmax(share, 0.0), 1.0);
   const strip_plot force = {.box = {gap, top, middle - 0.5F * gap, bottom},
                             .unit = u,
@@ -238,6 +258,114 @@ void legend_draw(ink *io, const view_frame *frame, const int size[2])
     ink_panel(io, (const float[4]){right - 12.0F * u, y - 11.0F * u, right, y + 1.0F * u}, 3.0F * u,
               colour);
     y += 20.0F * u;
+  }
+}
+
+/* ---- over the picture ---- */
+
+static float panel_width(const view_panel *panel, float u)
+{
+  float wide[2] = {0.0F, 0.0F};
+  for (size_t i = 0; i < panel->row_count; ++i) {
+    for (int k = 0; k < 2; ++k) {
+      wide[k] = fmaxf(wide[k], ink_text_width(panel->rows[i][k], 8.5F * u));
+    }
+  }
+  return 50.0F * u + fmaxf(wide[0] + wide[1], ink_text_width(panel->title, 9.5F * u));
+}
+
+static void panel_draw(ink *io, const view_panel *panel, const float at[2], float u)
+{
+  const float row = 17.0F * u;
+  const float text = 8.5F * u;
+  const float right = at[0] + panel_width(panel, u);
+  float first = 0.0F;
+  for (size_t i = 0; i < panel->row_count; ++i) {
+    first = fmaxf(first, ink_text_width(panel->rows[i][0], text));
+  }
+  const float bottom = at[1] + 44.0F * u + row * (float)panel->row_count;
+  ink_panel(io, (const float[4]){at[0], at[1], right, bottom}, 8.0F * u, ink_panel_colour);
+  ink_text(io, (const float[3]){at[0] + 16.0F * u, at[1] + 24.0F * u, 9.5F * u}, INK_LEFT,
+           ink_light, panel->title);
+  for (size_t i = 0; i < panel->row_count; ++i) {
+    const float y = at[1] + 46.0F * u + row * (float)i;
+    ink_text(io, (const float[3]){at[0] + 16.0F * u, y, text}, INK_LEFT, ink_light,
+             panel->rows[i][0]);
+    ink_text(io, (const float[3]){at[0] + 34.0F * u + first, y, text}, INK_LEFT, ink_faint,
+             panel->rows[i][1]);
+  }
+}
+
+static void notice_draw(ink *io, const char *notice, bool strips, const int size[2])
+{
+  const float u = strips_unit(size[1]);
+  const float below = strips ? strips_share(size[1]) : 0.0F;
+  float y = (float)size[1] * (1.0F - below) - 30.0F * u;
+  char line[128];
+  while (*notice != '\0') {
+    const size_t length = strcspn(notice, "\n");
+    snprintf(line, sizeof line, "%.*s", (int)length, notice);
+    const float half = 0.5F * ink_text_width(line, 10.0F * u) + 12.0F * u;
+    const float x = 0.5F * (float)size[0];
+    ink_panel(io, (const float[4]){x - half, y - 16.0F * u, x + half, y + 9.0F * u}, 6.0F * u,
+              ink_panel_colour);
+    ink_text(io, (const float[3]){x, y + 1.0F * u, 10.0F * u}, INK_MIDDLE, ink_light, line);
+    notice += length + (notice[length] != '\0');
+    y -= 30.0F * u;
+  }
+}
+
+/* Ends and height of the slider: over the curve of the force strip. */
+static void slider_place(const int size[2], float out[3])
+{
+  const float u = strips_unit(size[1]);
+  out[0] = 24.0F * u;
+  out[1] = (float)size[0] - 24.0F * u;
+  out[2] = (float)size[1] * (1.0F - strips_share(size[1])) - 14.0F * u;
+}
+
+bool slider_share(const int size[2], const double xy[2], double *out_share)
+{
+  float at[3];
+  slider_place(size, at);
+  const double share = (xy[0] - (double)at[0]) / (double)(at[1] - at[0]);
+  *out_share = fmin(fmax(share, 0.0), 1.0);
+  return share > -0.02 && share < 1.02 &&
+         fabs(xy[1] - (double)at[2]) < 14.0 * (double)strips_unit(size[1]);
+}
+
+static void slider_draw(ink *io, const double shares[2], const int size[2])
+{
+  static const float filled[4] = {0.86F, 0.13F, 0.17F, 1.0F};
+  const float u = strips_unit(size[1]);
+  float at[3];
+  slider_place(size, at);
+  const float wide = at[1] - at[0];
+  const float now = at[0] + wide * (float)shares[0];
+  const float known = at[0] + wide * (float)shares[1];
+  ink_line(io, (const float[4]){at[0], at[2], at[1], at[2]}, 3.0F * u, ink_paper);
+  ink_line(io, (const float[4]){at[0], at[2], known, at[2]}, 3.0F * u, ink_panel_colour);
+  ink_line(io, (const float[4]){at[0], at[2], now, at[2]}, 3.0F * u, filled);
+  ink_line(io, (const float[4]){now, at[2], now, at[2]}, 8.0F * u, ink_light);
+  ink_line(io, (const float[4]){now, at[2], now, at[2]}, 5.5F * u, filled);
+}
+
+void overlay_draw(ink *io, const view_labels *labels, bool strips, const int size[2])
+{
+  const float u = strips_unit(size[1]);
+  if (labels->has_slider) {
+    slider_draw(io, labels->slider, size);
+  }
+  if (labels->notice[0] != '\0') {
+    notice_draw(io, labels->notice, strips, size);
+  }
+  for (size_t i = 0; i < VIEW_PANELS; ++i) {
+    const view_panel *p = &labels->panels[i];
+    const float middle = 0.5F * ((float)size[0] - panel_width(p, u));
+    const float at[2] = {i == 0 ? 22.0F * u : middle, (i == 0 ? 100.0F : 36.0F) * u};
+    if (p->row_count > 0) {
+      panel_draw(io, p, at, u);
+    }
   }
 }
 

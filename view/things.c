@@ -462,6 +462,24 @@ static void axis_place(things *io, const thing_axis *axis, const view_frame *fra
   stick_place(io, world[0], world[1], 0.007F * size, colour);
 }
 
+/* The string that a hand is pulled by, and its end. */
+static void pull_place(things *io, const view_pointer *pointer, float size)
+{
+  static const float colour[3] = {0.16F, 0.18F, 0.22F};
+  float from[3];
+  float to[3];
+  for (int i = 0; i < 3; ++i) {
+    from[i] = (float)pointer->device.position[i];
+    to[i] = (float)pointer->pull[i];
+  }
+  stick_place(io, from, to, 0.0035F * size, colour);
+  gpu_instance *end = instance_add(io, THING_ROUND);
+  memcpy(end->place, to, sizeof to);
+  end->bevel = 0.011F * size;
+  end->gloss = -1.0F;
+  colour_set(end, colour, 1.0F);
+}
+
 static bool device_differs(const view_pointer *p)
 {
   const double *a = p->proxy.position;
@@ -473,6 +491,9 @@ static void marks_place(things *io, const view_frame *frame, float size)
 {
   for (size_t i = 0; i < frame->pointer_count; ++i) {
     arrow_place(io, &frame->pointers[i], size);
+    if (frame->pointers[i].is_pulled) {
+      pull_place(io, &frame->pointers[i], size);
+    }
   }
   for (size_t i = 0; i < frame->touch_count; ++i) {
     touch_place(io, &frame->touches[i], size);
@@ -511,4 +532,57 @@ void things_place(things *io, const view_frame *frame, float size)
   for (size_t i = 0; i < io->batch_count; ++i) {
     gpu_mesh_load(&io->batches[i].mesh, io->batches[i].list, io->batches[i].count);
   }
+}
+
+/* ---- what is seen where ---- */
+
+/* Half the edges of the box around it, in the geom's frame. */
+static void thing_box(const thing *t, double out[3])
+{
+  for (int i = 0; i < 3; ++i) {
+    const bool own = t->mesh >= THING_MESHES;
+    out[i] = (double)(own ? t->extent : t->instance.extent[i] + t->instance.bevel);
+  }
+}
+
+/* How far along a line the box is entered; negative: it is not met. */
+static double box_depth(const double half[3], const double from[3], const double way[3])
+{
+  double near = 0.0;
+  double far = INFINITY;
+  for (int i = 0; i < 3; ++i) {
+    const double slope = fabs(way[i]) > 1e-12 ? way[i] : 1e-12;
+    const double a = (-half[i] - from[i]) / slope;
+    const double b = (half[i] - from[i]) / slope;
+    near = fmax(near, fmin(a, b));
+    far = fmin(far, fmax(a, b));
+  }
+  return near <= far ? near : -1.0;
+}
+
+uint32_t things_hit(const things *of, const view_frame *frame, const double eye[3],
+                    const double way[3], double *out_depth)
+{
+  uint32_t body = HAP_SCENE_WORLD;
+  double best = INFINITY;
+  for (size_t i = 0; i < of->count; ++i) {
+    const thing *t = &of->list[i];
+    double half[3];
+    double points[2][2][3];
+    if (t->extent <= 0.0F) {
+      continue;
+    }
+    thing_box(t, half);
+    vector_into(frame_of(frame, t->body), eye, true, points[0][0]);
+    vector_into(frame_of(frame, t->body), way, false, points[0][1]);
+    vector_into(&t->pose, points[0][0], true, points[1][0]);
+    vector_into(&t->pose, points[0][1], false, points[1][1]);
+    const double depth = box_depth(half, points[1][0], points[1][1]);
+    if (depth > 0.0 && depth < best) {
+      best = depth;
+      body = t->body;
+    }
+  }
+  *out_depth = best < INFINITY ? best : 0.0;
+  return body;
 }

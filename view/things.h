@@ -63,6 +63,10 @@ void things_free(things *of);
 size_t things_balls(const things *of, const view_frame *frame, float *out_size);
 /* Fills the batches; size: of the scene, m. */
 void things_place(things *io, const view_frame *frame, float size);
+/* The first body that a line of sight meets, boxes around shapes counting as shapes, and how far
+ * from the eye, m; HAP_SCENE_WORLD where there is none or one that never moves. */
+uint32_t things_hit(const things *of, const view_frame *frame, const double eye[3],
+                    const double way[3], double *out_depth);
 /* The arrow of a pointer's force. False: there is next to none. */
 bool things_arrow(const view_pointer *pointer, float size, float out_from[3], float out_to[3]);
 

@@ -24,6 +24,7 @@ typedef struct view_programs {
 
 struct view {
   int size[2];
+  bool begun; /* there is a context */
   gpu_context context;
   gpu_surfaces surfaces;
   view_programs programs;
@@ -39,12 +40,13 @@ struct view {
 
 static const float sun[3] = {-0.6120F, -0.2318F, 0.7561F}; /* unit, towards it */
 
-static hap_status view_make(view *v, hap_detail *detail)
+static hap_status view_make(view *v, bool here, hap_detail *detail)
 {
-  hap_status status = gpu_context_open(&v->context, detail);
+  hap_status status = here ? HAP_OK : gpu_context_open(&v->context, detail);
   if (status < HAP_OK) {
     return status;
   }
+  v->begun = true;
   status = gpu_surfaces_make(v->size[0], v->size[1], &v->surfaces, detail);
   if (status < HAP_OK) {
     return status;
@@ -60,11 +62,18 @@ static hap_status view_make(view *v, hap_detail *detail)
   return status < HAP_OK ? status : things_read(NULL, &v->things, detail);
 }
 
-hap_status view_create(int width, int height, view **out, hap_detail *detail)
+static bool size_is_good(int width, int height)
+{
+  return width >= VIEW_PIXELS_MIN && width <= VIEW_PIXELS_MAX && height >= VIEW_PIXELS_MIN &&
+         height <= VIEW_PIXELS_MAX;
+}
+
+static hap_status view_begin(const int size[2], bool here, view **out, hap_detail *detail)
 {
   *out = NULL;
-  if (width < VIEW_PIXELS_MIN || width > VIEW_PIXELS_MAX || height < VIEW_PIXELS_MIN ||
-      height > VIEW_PIXELS_MAX) {
+  const int width = size[0];
+  const int height = size[1];
+  if (!size_is_good(width, height)) {
     return HAP_ERROR_ARGUMENT;
   }
   view *v = calloc(1, sizeof *v);
@@ -77,7 +86,7 @@ hap_status view_create(int width, int height, view **out, hap_detail *detail)
     free(v);
     return HAP_ERROR_MEMORY;
   }
-  hap_status status = view_make(v, detail);
+  hap_status status = view_make(v, here, detail);
   if (status < HAP_OK) {
     view_destroy(v);
     return status;
@@ -86,12 +95,39 @@ hap_status view_create(int width, int height, view **out, hap_detail *detail)
   return HAP_OK;
 }
 
+hap_status view_create(int width, int height, view **out, hap_detail *detail)
+{
+  return view_begin((const int[2]){width, height}, false, out, detail);
+}
+
+hap_status view_create_here(int width, int height, view **out, hap_detail *detail)
+{
+  return view_begin((const int[2]){width, height}, true, out, detail);
+}
+
+hap_status view_resize(view *v, int width, int height, hap_detail *detail)
+{
+  if (!size_is_good(width, height)) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  uint8_t *pixels = malloc(3 * (size_t)width * (size_t)height);
+  if (pixels == NULL) {
+    return HAP_ERROR_MEMORY;
+  }
+  free(v->pixels);
+  v->pixels = pixels;
+  v->size[0] = width;
+  v->size[1] = height;
+  gpu_surfaces_free(&v->surfaces);
+  return gpu_surfaces_make(width, height, &v->surfaces, detail);
+}
+
 void view_destroy(view *v)
 {
   if (v == NULL) {
     return;
   }
-  if (v->context.context != NULL) {
+  if (v->begun) {
     things_free(&v->things);
     ink_free(&v->ink);
     glDeleteProgram(v->programs.body);
@@ -118,6 +154,19 @@ void view_set_camera(view *v, const double eye[3], const double target[3])
     v->camera.target[i] = (float)target[i];
   }
   v->camera_given = true;
+}
+
+void view_get_camera(const view *v, double out_eye[3], double out_target[3])
+{
+  for (int i = 0; i < 3; ++i) {
+    out_eye[i] = (double)v->camera.eye[i];
+    out_target[i] = (double)v->camera.target[i];
+  }
+}
+
+void view_free_camera(view *v)
+{
+  v->camera_given = v->framed = false;
 }
 
 void view_set_calm(view *v, double share)
@@ -157,10 +206,12 @@ static void camera_place(view *v, const view_frame *frame, bool strips)
   v->camera.up_share = below - above;
   v->camera.free_share = 1.0F - below - above;
   camera_frame(&v->camera, v->things.balls, count, view_aspect(v));
+  if (v->framed) {
+    v->camera.size += v->calm * (given.size - v->camera.size);
+  }
   if (v->framed && !v->camera_given && v->calm > 0.0F) {
     vector_blend(given.eye, v->calm, v->camera.eye);
     vector_blend(given.target, v->calm, v->camera.target);
-    v->camera.size += v->calm * (given.size - v->camera.size);
     camera_look(&v->camera, view_aspect(v));
   }
   v->framed = true;
@@ -277,6 +328,9 @@ static void text_draw(view *v, const view_frame *frame, const view_strips *strip
   if (strips != NULL) {
     strips_draw(&v->ink, strips, frame->t, v->size);
   }
+  if (labels != NULL) {
+    overlay_draw(&v->ink, labels, strips != NULL, v->size);
+  }
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_CULL_FACE);
   glEnable(GL_BLEND);
@@ -300,7 +354,8 @@ static void pixels_flip(view *v)
   }
 }
 
-const uint8_t *view_draw(view *v, const view_frame *frame, const view_strips *strips,
+/* Into the surface with one sample a pixel, which is bound then. */
+static void picture_draw(view *v, const view_frame *frame, const view_strips *strips,
                          const view_labels *labels)
 {
   view_matrix sun_map;
@@ -326,6 +381,22 @@ const uint8_t *view_draw(view *v, const view_frame *frame, const view_strips *st
                     GL_NEAREST);
   glBindFramebuffer(GL_FRAMEBUFFER, v->surfaces.one);
   text_draw(v, frame, strips, labels);
+}
+
+void view_show(view *v, const view_frame *frame, const view_strips *strips,
+               const view_labels *labels)
+{
+  picture_draw(v, frame, strips, labels);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+  glBlitFramebuffer(0, 0, v->size[0], v->size[1], 0, 0, v->size[0], v->size[1], GL_COLOR_BUFFER_BIT,
+                    GL_NEAREST);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, v->surfaces.one);
+}
+
+const uint8_t *view_draw(view *v, const view_frame *frame, const view_strips *strips,
+                         const view_labels *labels)
+{
+  picture_draw(v, frame, strips, labels);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, v->size[0], v->size[1], GL_RGB, GL_UNSIGNED_BYTE, v->pixels);
   pixels_flip(v);
@@ -346,6 +417,40 @@ bool view_project(const view *v, const double point[3], double out_xy[2])
   out_xy[0] = 0.5 * (1.0 + (double)(clip[0] / clip[3])) * v->size[0];
   out_xy[1] = 0.5 * (1.0 - (double)(clip[1] / clip[3])) * v->size[1];
   return true;
+}
+
+void view_ray(const view *v, const double xy[2], double out_eye[3], double out_way[3])
+{
+  const float *m = v->camera.back.at;
+  const float x = 2.0F * (float)xy[0] / (float)v->size[0] - 1.0F;
+  const float y = 1.0F - 2.0F * (float)xy[1] / (float)v->size[1];
+  float way[3];
+  for (int i = 0; i < 3; ++i) {
+    way[i] = m[i] * x + m[4 + i] * y + m[12 + i];
+  }
+  view_normalize(way);
+  for (int i = 0; i < 3; ++i) {
+    out_eye[i] = (double)v->camera.eye[i];
+    out_way[i] = (double)way[i];
+  }
+}
+
+uint32_t view_pick(const view *v, const view_frame *frame, const double xy[2], double out_point[3])
+{
+  double eye[3];
+  double way[3];
+  double depth = 0.0;
+  view_ray(v, xy, eye, way);
+  uint32_t body = things_hit(&v->things, frame, eye, way, &depth);
+  for (int i = 0; i < 3; ++i) {
+    out_point[i] = eye[i] + depth * way[i];
+  }
+  return body;
+}
+
+bool view_slider_at(const view *v, const double xy[2], double *out_share)
+{
+  return slider_share(v->size, xy, out_share);
 }
 
 void view_arrow(const view *v, const view_pointer *pointer, double out_from[3], double out_to[3])
