@@ -19,7 +19,8 @@ PATH = re.compile(r"`((?:docs|lib(?!/udev)|include|tests|tools|bench|scenes|plug
 # Words of a command that calls for hardware, for a driver, for a file of another one, or for a
 # clock.
 NEEDS_MORE = ("spidar", "module:", "replay:", "/", "--play", "--identity", "--record",
-              "--tick-share", "--physics-share", "--reconnect", "--shot", "--frames")
+              "--tick-share", "--physics-share", "--reconnect", "--shot", "--frames",
+              "--view")
 # What a piece of code may use; a whole program has a main of its own.
 BEFORE = """#include <hapode/hapode.h>
 #include <hapode/ode.h>

@@ -21,6 +21,7 @@
 #include "tools/run_options.h"
 #include "tools/run_recording.h"
 #include "tools/run_summary.h"
+#include "tools/run_window.h"
 
 enum exit_code {
   EXIT_GOOD = 0,
@@ -159,7 +160,7 @@ static hap_status picture_draw(const run_loop *loop, hap_detail *detail)
 
 static void status_tell(const run_options *options, hap_status status, const hap_stats *stats)
 {
-  if (status == HAP_END) {
+  if (status == HAP_END && !options->window.wanted) {
     fprintf(stderr, "hapode-run: stopped early, after %.3f s\n",
             (double)stats->loop.ticks / options->rig.def.haptic_hz);
   }
@@ -227,6 +228,8 @@ static int run_and_report(run_loop *loop, const run_recording *recording)
   return code;
 }
 
+#define ENDLESS_S 1e6 /* of a window */
+
 /* Of a replay: the whole recording. */
 static double seconds_of(const run_options *options, const rig *r, const run_recording *recording)
 {
@@ -235,7 +238,8 @@ static double seconds_of(const run_options *options, const rig *r, const run_rec
   }
   return recording->player != NULL
              ? (double)recording->info.ticks / options->rig.def.haptic_hz + 1.0
-             : r->scene->parameters.duration;
+         : options->window.wanted ? ENDLESS_S
+                                  : r->scene->parameters.duration;
 }
 
 static size_t pointers_of(const rig *r, const run_recording *recording)
@@ -246,6 +250,13 @@ static size_t pointers_of(const rig *r, const run_recording *recording)
   return recording->info.pointers > 0 ? recording->info.pointers : 1;
 }
 
+/* The window's strips are of a whole recording, else they move on. */
+static double strips_of(const run_options *options, const run_recording *recording)
+{
+  return recording->player != NULL ? (double)recording->info.ticks / options->rig.def.haptic_hz
+                                   : 0.0;
+}
+
 static int run_in(const run_options *options, rig *r, const run_recording *recording)
 {
   hap_detail detail = {""};
@@ -254,9 +265,14 @@ static int run_in(const run_options *options, rig *r, const run_recording *recor
                    .rig = r,
                    .seconds = seconds_of(options, r, recording),
                    .coupling = &coupling,
+                   .stage = options->window.stage,
                    .pointers = pointers_of(r, recording)};
   run_progress_init(&loop.progress, options->rig.max_force > 0.0 ? options->rig.max_force : 20.0);
   int code = open_shot(options, &loop, &detail);
+  if (code == EXIT_GOOD && run_stage_enter(loop.stage, options, r, loop.pointers,
+                                           strips_of(options, recording), &detail) < HAP_OK) {
+    code = EXIT_FAILED;
+  }
   if (code == EXIT_GOOD &&
       !(open_trace(options, &loop, &detail) && open_black_box(options, &loop, &detail) &&
         open_picture(options, &loop, &detail))) {
@@ -271,6 +287,7 @@ static int run_in(const run_options *options, rig *r, const run_recording *recor
     (void)close_black_box(&loop, &detail);
   }
   run_picture_destroy(loop.picture);
+  run_stage_leave(loop.stage);
   return code;
 }
 
@@ -316,6 +333,7 @@ static int run_world(run_options *options, const run_recording *recording)
   rig r;
   hap_detail detail = {""};
   dInitODE2(0);
+  run_stage_prepare(options->window.stage, options);
   hap_status status = rig_create(&options->rig, &r, &detail);
   int code = status < HAP_OK ? run_refuse(&r, status, &detail) : run_in(options, &r, recording);
   if (status >= HAP_OK) {
@@ -339,6 +357,28 @@ static int run_session(run_options *options)
   }
   run_recording_close(&recording);
   return code;
+}
+
+/* All runs of a window; their thread draws nothing. */
+static int run_sessions(run_options *options)
+{
+  int code;
+  do {
+    code = run_session(options);
+  } while (run_stage_goes_on(options->window.stage, options) && code == EXIT_GOOD);
+  return code;
+}
+
+static int run_shown(run_options *options)
+{
+  hap_detail detail = {""};
+  int code = EXIT_GOOD;
+  hap_status status = run_window(options, run_sessions, &code, &detail);
+  if (status >= HAP_OK) {
+    return code;
+  }
+  fprintf(stderr, "hapode-run: %s\n", detail.text);
+  return status == HAP_ERROR_UNSUPPORTED ? EXIT_USAGE : EXIT_FAILED;
 }
 
 /* Any thread but the haptic. */
@@ -382,8 +422,10 @@ int main(int argc, char **argv)
       if (options.calibrate_path != NULL) {
         return run_alone(&options, run_calibrate);
       }
-      return options.identify_path != NULL ? run_alone(&options, run_identify)
-                                           : run_session(&options);
+      if (options.identify_path != NULL) {
+        return run_alone(&options, run_identify);
+      }
+      return options.window.wanted ? run_shown(&options) : run_session(&options);
   }
   return EXIT_GOOD;
 }

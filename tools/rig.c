@@ -101,7 +101,14 @@ static hap_status open_device(const rig_options *options, rig *r, size_t index, 
                      "virtual:path=0:0/0/0;1:0.1/0/0",
                      p->name, p->pointers, index + 1);
   }
-  return hap_device_open(spec, &r->devices[index], detail);
+  HAPI_TRY(hap_device_open(spec, &r->devices[index], detail));
+  if (options->around == NULL) {
+    return HAP_OK;
+  }
+  hap_device *inner = r->devices[index];
+  HAPI_TRY(options->around->put(options->around->user, index, &r->devices[index], detail));
+  r->inner[index] = r->devices[index] != inner ? inner : NULL;
+  return HAP_OK;
 }
 
 static hap_status add_pointer(const rig_options *options, rig *r, const rig_hand *hand,
@@ -248,6 +255,7 @@ void rig_destroy(rig *r)
   hap_session_destroy(r->session);
   for (size_t i = 0; i < RIG_POINTERS_MAX; ++i) {
     hap_device_close(r->devices[i]);
+    hap_device_close(r->inner[i]);
   }
   scene_destroy(r->scene);
   memset(r, 0, sizeof *r);

@@ -14,6 +14,12 @@
 
 #define RIG_POINTERS_MAX 16
 
+/* Puts a device around a pointer's one, or leaves *io as it is. */
+typedef struct rig_around {
+  hap_status (*put)(void *user, size_t index, hap_device **io, hap_detail *detail);
+  void *user;
+} rig_around;
+
 typedef struct rig_options {
   const char *scene;                  /* "name" or "name:N" */
   const scene_parameters *parameters; /* not NULL: build from these with count, not from scene */
@@ -43,6 +49,7 @@ typedef struct rig_options {
   const hap_record_def *record; /* not NULL: the session is recorded */
   hap_player *player; /* not NULL: it plays, with the def and the pointers of the recording */
   hap_integration integration; /* of the pointers */
+  const rig_around *around;    /* NULL: none */
 } rig_options;
 
 typedef enum rig_part {
@@ -56,6 +63,7 @@ typedef struct rig {
   scene *scene;
   hap_session *session;
   hap_device *devices[RIG_POINTERS_MAX]; /* device_count */
+  hap_device *inner[RIG_POINTERS_MAX];   /* what the devices are around; NULL: nothing */
   size_t device_count;
   size_t effectors_left; /* end effectors that drive no pointer */
   hap_pointer_id pointers[RIG_POINTERS_MAX];

@@ -99,7 +99,7 @@ bool run_loop_stop_wanted(void)
 int32_t run_loop_trace_rows(const run_options *options)
 {
   if (options->trace_path == NULL && options->plot_path == NULL && options->shot.path == NULL &&
-      options->shot.frames == NULL) {
+      options->shot.frames == NULL && !options->window.wanted) {
     return 0;
   }
   return (int32_t)fmin(fmax(options->rig.def.haptic_hz, ROWS_MIN), ROWS_MAX);
@@ -130,7 +130,8 @@ static void trace_drain(run_loop *loop)
 {
   hap_trace_row rows[ROWS_AT_ONCE];
   size_t count = 0;
-  if (loop->trace.file == NULL && loop->picture == NULL && loop->shot == NULL) {
+  if (loop->trace.file == NULL && loop->picture == NULL && loop->shot == NULL &&
+      loop->stage == NULL) {
     return;
   }
   while (hap_session_trace_read(loop->rig->session, rows, ROWS_AT_ONCE, sizeof(hap_trace_row),
@@ -140,6 +141,7 @@ static void trace_drain(run_loop *loop)
     }
     for (size_t i = 0; i < count; ++i) {
       run_shot_add_row(loop->shot, &rows[i]);
+      run_stage_add_row(loop->stage, &rows[i]);
     }
     write_rows(loop, rows, count);
   }
@@ -161,7 +163,7 @@ static double strongest_force(const rig *r)
 static void show_progress(watch *w, double t, const hap_stats *stats)
 {
   double now = wall_clock();
-  if (now < w->next_progress) {
+  if (now < w->next_progress || w->loop->stage != NULL) {
     return;
   }
   run_progress_show(&w->loop->progress, w->loop->seconds - t, strongest_force(w->loop->rig),
@@ -211,8 +213,12 @@ static hap_status watch_look(watch *w, double t)
     w->next_sample = t + run_picture_interval(loop->picture) - 0.5 * PAUSE_S;
   }
   show_progress(w, t, &stats);
-  bool plays = loop->options->play_path != NULL;
-  if (stats.faults.fault != HAP_FAULT_NONE && !plays && !device_reconnect(w, t, &stats)) {
+  hap_status shown = run_stage_look(loop->stage, t);
+  if (shown != HAP_OK) {
+    return shown;
+  }
+  bool stays = loop->options->play_path != NULL || loop->stage != NULL; /* the window shows it */
+  if (stats.faults.fault != HAP_FAULT_NONE && !device_reconnect(w, t, &stats) && !stays) {
     (void)hap_session_detail(loop->rig->session, w->detail);
     return HAP_ERROR_DEVICE;
   }
@@ -225,7 +231,7 @@ static hap_status run_threads(watch *w)
   double start = wall_clock();
   double t = 0.0;
   hap_status status = HAP_OK;
-  while (status >= HAP_OK && t < w->loop->seconds) {
+  while (status == HAP_OK && t < w->loop->seconds) {
     if (stop_wanted != 0) {
       return HAP_END;
     }
@@ -246,7 +252,7 @@ static hap_status run_lockstep(watch *w)
   uint64_t all = (uint64_t)llround(w->loop->seconds * hz);
   uint64_t stretch = (uint64_t)ceil(PAUSE_S * hz);
   hap_status status = HAP_OK;
-  for (uint64_t done = 0; status >= HAP_OK && done < all;) {
+  for (uint64_t done = 0; status == HAP_OK && done < all;) {
     if (stop_wanted != 0) {
       return HAP_END;
     }
@@ -262,6 +268,7 @@ static hap_status run_lockstep(watch *w)
       return status;
     }
     status = watch_look(w, (double)done / hz);
+    run_stage_pace(w->loop->stage, (double)done / hz);
   }
   return status;
 }

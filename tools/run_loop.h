@@ -10,6 +10,7 @@
 #include "tools/run_picture.h"
 #include "tools/run_progress.h"
 #include "tools/run_shot.h"
+#include "tools/run_stage.h"
 #include "tools/trace_csv.h"
 
 typedef struct run_loop {
@@ -21,6 +22,7 @@ typedef struct run_loop {
   FILE *black_box;      /* NULL: none wanted */
   run_picture *picture; /* NULL: none wanted */
   run_shot *shot;       /* NULL: none wanted */
+  run_stage *stage;     /* of the window; NULL: there is none */
   run_progress progress;
   run_coupling *coupling; /* filled in on the way */
   size_t pointers;        /* of trace and picture */

@@ -161,6 +161,14 @@ static hap_status take_pixels(run_options *options, const option *self, const ch
                              self->low, self->high);
 }
 
+static hap_status take_keys(run_options *options, const option *self, const char *value,
+                            hap_detail *detail)
+{
+  (void)self;
+  options->window.keys_given = true;
+  return run_keys_parse(value, &options->window.keys, detail);
+}
+
 static hap_status take_effects(run_options *options, const option *self, const char *value,
                                hap_detail *detail)
 {
@@ -374,14 +382,20 @@ static const option table[] = {
      offsetof(run_options, trace_path), 0, 0},
     {"--plot", "FILE", "picture of the run as SVG, drawn by gnuplot", take_text,
      offsetof(run_options, plot_path), 0, 0},
+    {"--view", NULL,
+     "a window on the run until it is closed, or for --seconds: the mouse pulls the\n"
+     "hand, F1 lists the keys (docs/view.md)",
+     take_flag, offsetof(run_options, window.wanted), 0, 0},
+    {"--keys", "LIST", "of the window, such as quit=x,scene-next=off, or all=off", take_keys, 0, 0,
+     0},
     {"--shot", "FILE", "picture of the scene as PNG, when the force is strongest; needs no display",
      take_text, offsetof(run_options, shot.path), 0, 0},
     {"--shot-at", "S", "the picture is of this time of the run", take_number,
      offsetof(run_options, shot.at), 0, 86400},
     {"--frames", "DIR", "such pictures 30 times a second, as frame_00000.png and so on", take_text,
      offsetof(run_options, shot.frames), 0, 0},
-    {"--shot-size", "WxH", "pixels of these pictures (default 1280x720)", take_pixels, 0, 320,
-     8192},
+    {"--shot-size", "WxH", "pixels of these pictures and of the window (default 1280x720)",
+     take_pixels, 0, 320, 8192},
     {"--camera", "POINTS",
      "of these pictures: x,y,z of the eye, then of what it looks at, m (default: all\n"
      "that moves is in the picture)",
@@ -444,7 +458,8 @@ static bool beside_play(const option *o)
                                       "--list",    "--list-probe",
                                       "--shot",    "--shot-at",
                                       "--frames",  "--shot-size",
-                                      "--camera",  "--help",
+                                      "--camera",  "--view",
+                                      "--keys",    "--help",
                                       "--version"};
   bool found = false;
   for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
@@ -566,9 +581,18 @@ static hap_status check_shot(const run_options *o, hap_detail *detail)
   if (s->path == NULL && s->at >= 0.0) {
     return options_fail(detail, "--shot-at: only with --shot");
   }
+  if (o->window.wanted && (s->path != NULL || s->frames != NULL || alone)) {
+    return options_fail(detail,
+                        "--view: not with --shot, --frames, --identify, --calibrate or "
+                        "--check-device");
+  }
+  if (o->window.keys_given && !o->window.wanted) {
+    return options_fail(detail, "--keys: only with --view");
+  }
   if (s->path == NULL && s->frames == NULL) {
-    return s->camera_given ? options_fail(detail, "--camera: only with --shot or --frames")
-                           : HAP_OK;
+    return s->camera_given && !o->window.wanted
+               ? options_fail(detail, "--camera: only with --shot, --frames or --view")
+               : HAP_OK;
   }
   if (texts_same(s->path, o->trace_path) || texts_same(s->path, o->plot_path) ||
       texts_same(s->path, o->black_box_path) || texts_same(s->path, o->record_path) ||
@@ -697,6 +721,7 @@ hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail
   out->model_age_s = -1.0;
   out->lookback = -1.0;
   out->shot = (run_shot_options){.at = -1.0, .size = {1280, 720}};
+  run_keys_init(&out->window.keys);
   out->check.force = CONFORM_FORCE_DEFAULT;
   out->check.wait_s = 5.0;
   for (int at = 1; at < argc && status >= HAP_OK && out->action == RUN_SESSION; ++at) {

@@ -10,6 +10,7 @@
 #include "tools/conform/conform.h"
 #include "tools/rig.h"
 #include "tools/run_effects.h"
+#include "tools/run_keys.h"
 
 typedef enum run_action {
   RUN_SESSION = 0,
@@ -29,6 +30,14 @@ typedef struct run_shot_options {
   double camera[6]; /* m: eye, then what it looks at */
 } run_shot_options;
 
+/* A window on the run. */
+typedef struct run_window_options {
+  bool wanted;
+  run_keys keys;
+  bool keys_given;
+  struct run_stage *stage; /* of the window that is open; NULL: none */
+} run_window_options;
+
 typedef struct run_options {
   run_action action;
   rig_options rig;
@@ -41,6 +50,7 @@ typedef struct run_options {
   const char *plot_path;
   const char *black_box_path;
   run_shot_options shot;
+  run_window_options window;
   const char *identify_path;  /* not NULL: identify the device, no session */
   const char *calibrate_path; /* not NULL: calibrate the device, no session */
   conform_options check;      /* spec not NULL: check that device, no session */

@@ -94,6 +94,7 @@ static void print_more(const hap_stats *stats, FILE *out)
   count_print(out, "range_most", stats->room.range_most);
   count_print(out, "range_cut", stats->room.range_cut);
   number_print(out, "update_ns", stats->room.update_ns);
+  count_print(out, "locks", stats->edits.locks);
 }
 
 void run_summary_print(const run_options *options, const hap_stats *stats,

@@ -14,9 +14,9 @@ say() {
 # gcc alone only recommends the C library's headers, so libc6-dev is named.
 packages_needed=(gcc libc6-dev meson ninja-build pkg-config libode-dev libccd-dev
   zlib1g-dev)
-# For hapode-run --shot.
+# For hapode-run --view and --shot.
 # shellcheck disable=SC2034
-packages_view=(libepoxy-dev libegl-dev libgl1-mesa-dri libpng-dev)
+packages_view=(libglfw3-dev libepoxy-dev libegl-dev libgl1-mesa-dri libpng-dev)
 
 # Whether a package, or the same thing from elsewhere, is there.
 have_package() {

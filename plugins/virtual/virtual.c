@@ -776,6 +776,12 @@ void hapi_virtual_get_port(const void *self, hapi_virtual_port *out)
   out->mass = device->yields ? device->hand.def.mass : 0.0;
 }
 
+void hapi_virtual_get_hand(const void *self, hapi_hand_def *out)
+{
+  const virtual_device *device = self;
+  *out = device != NULL && device->yields ? device->hand.def : presets[RELAXED];
+}
+
 const hap_device_ops hapi_virtual_ops = {
     .abi = HAP_DEVICE_ABI,
     .size = sizeof(hap_device_ops),

@@ -25,8 +25,7 @@ def because(reason, names):
 # Function: why no program shows it.
 NO_PROGRAM = {
     **because("a name for people, or defaults of a struct", """
-        hap_event_name hap_force_kind_name hap_grab_def_init hap_scene_def_init
-        hap_scene_name_at"""),
+        hap_event_name hap_force_kind_name hap_grab_def_init hap_scene_def_init"""),
 }
 
 
