@@ -81,6 +81,87 @@ static void scene_end(hap_scene *scene, hap_session *session)
 
 /* ---- mass ---- */
 
+/* A shaft of no geom at all, with a ball: what the def says counts, and not the ball. */
+TEST(a_body_may_have_its_own_inertia)
+{
+  hap_scene *scene = scene_new(0.0);
+  hap_geom_def ball = geom_of(HAP_SHAPE_SPHERE);
+  hap_body_def def;
+  uint32_t bodies[2];
+  const double inertia[3][3] = {{0.3, 0.02, -0.01}, {0.02, 0.4, 0.03}, {-0.01, 0.03, 0.5}};
+  hap_body_def_init(&def, sizeof def);
+  def.geoms = &ball;
+  def.mass = 3.0;
+  def.has_inertia = 1;
+  memcpy(def.centre, ((double[3]){0.1, -0.2, 0.3}), sizeof def.centre);
+  memcpy(def.inertia, inertia, sizeof def.inertia);
+  for (size_t i = 0; i < 2; ++i) {
+    def.geom_count = i;
+    CHECK(hap_scene_add_body(scene, &def, &bodies[i], NULL, NULL) == HAP_OK);
+    hap_scene_body body = body_at(scene, bodies[i]);
+    CHECK_NEAR(body.mass, 3.0, 1e-12);
+    for (int k = 0; k < 9; ++k) {
+      CHECK_NEAR((&body.inertia[0][0])[k], (&inertia[0][0])[k], 1e-12);
+      CHECK_NEAR(body.centre[k % 3], def.centre[k % 3], 1e-12);
+    }
+    CHECK_NEAR(body.pose.position[0], 0.0, 1e-12);
+  }
+  scene_end(scene, NULL);
+}
+
+static const struct {
+  double mass;
+  double inertia[3][3];
+  const char *says;
+} no_bodies[] = {
+    {0.0, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, "mass is 0"},
+    {1.0, {{1, 0.1, 0}, {0, 1, 0}, {0, 0, 1}}, "not symmetric"},
+    {1.0, {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}}, "positive definite"},
+    {1.0, {{1, 0, 0}, {0, 1, 0}, {0, 0, 2.1}}, "exceeds the sum"},
+    {1.0, {{1, 0, 0}, {0, NAN, 0}, {0, 0, 1}}, "not finite"},
+};
+
+TEST(an_inertia_that_no_body_has_is_refused)
+{
+  hap_scene *scene = scene_new(0.0);
+  for (size_t i = 0; i < sizeof no_bodies / sizeof no_bodies[0]; ++i) {
+    hap_body_def def;
+    hap_detail why = {""};
+    hap_scene_counts counts;
+    hap_body_def_init(&def, sizeof def);
+    def.has_inertia = 1;
+    def.mass = no_bodies[i].mass;
+    memcpy(def.inertia, no_bodies[i].inertia, sizeof def.inertia);
+    CHECK(hap_scene_add_body(scene, &def, NULL, NULL, &why) == HAP_ERROR_ARGUMENT);
+    CHECK_SAY(strstr(why.text, no_bodies[i].says) != NULL, "%s", why.text);
+    CHECK(hap_scene_count(scene, &counts, sizeof counts) == HAP_OK && counts.bodies == 0);
+  }
+  scene_end(scene, NULL);
+}
+
+/* Three balls fall on each other: those that shall pass do, and the third stays on top. */
+TEST(bodies_that_are_let_pass_fall_through_each_other)
+{
+  hap_scene *scene = scene_new(9.81);
+  hap_geom_def ball = geom_of(HAP_SHAPE_SPHERE);
+  uint32_t balls[3];
+  floor_add(scene);
+  for (int i = 0; i < 3; ++i) {
+    balls[i] = body_add(scene, &ball, 1, (double[3]){0.0, 0.0, 0.05 + 0.11 * i});
+  }
+  CHECK(hap_scene_let_pass(scene, balls[1], balls[0], NULL) == HAP_OK);
+  CHECK(hap_scene_let_pass(scene, balls[0], balls[1], NULL) == HAP_OK);
+  CHECK(hap_scene_let_pass(scene, balls[0], balls[0], NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_scene_let_pass(scene, balls[0], 7, NULL) == HAP_ERROR_NOT_FOUND);
+  hap_session *session = session_over(scene);
+  REQUIRE(hap_session_start(session) == HAP_OK);
+  CHECK(hap_session_advance(session, 1000) >= HAP_OK);
+  CHECK_NEAR(body_at(scene, balls[0]).pose.position[2], 0.05, REST);
+  CHECK_NEAR(body_at(scene, balls[1]).pose.position[2], 0.05, REST);
+  CHECK_NEAR(body_at(scene, balls[2]).pose.position[2], 0.15, 2.0 * REST);
+  scene_end(scene, session);
+}
+
 /* A hammer whose frame is at the end of its shaft: the sums of two boxes, by hand. */
 TEST(mass_and_centre_of_a_body_are_those_of_its_geoms)
 {

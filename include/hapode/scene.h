@@ -116,7 +116,13 @@ typedef struct hap_body_def {
   double mass;
   uint32_t is_kinematic;     /* 1: nothing moves it but its velocity; default 0 */
   const hap_geom_def *geoms; /* each was initialised */
-  size_t geom_count;         /* 1..4096 */
+  size_t geom_count;         /* 1..4096; 0..4096 with has_inertia */
+  /* 1: mass, centre and inertia below count, and no volume does; default 0 */
+  uint32_t has_inertia;
+  double centre[3]; /* m, of mass, in the body's frame */
+  /* kg m^2, about the centre of mass, axes of the body's frame; symmetric, positive definite, and
+   * of a real body: no eigenvalue is larger than the sum of the other two */
+  double inertia[3][3];
 } hap_body_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */
@@ -169,6 +175,13 @@ HAP_API void hap_joint_def_init(hap_joint_def *def, size_t size_of_def);
  * hap_scene_add_body; HAP_ERROR_NOT_FOUND: no such body. */
 HAP_NODISCARD HAP_API hap_status hap_scene_add_joint(hap_scene *scene, const hap_joint_def *def,
                                                      uint32_t *out_joint, hap_detail *detail);
+
+/* [scene] Two bodies pass through each other from now on, as those that a joint connects do; twice
+ * is as good as once. While a session runs, contacts that press go with the next step.
+ * HAP_ERROR_NOT_FOUND: no such body. HAP_ERROR_ARGUMENT: they are the same. HAP_ERROR_MEMORY,
+ * HAP_ERROR_THREAD. */
+HAP_NODISCARD HAP_API hap_status hap_scene_let_pass(hap_scene *scene, uint32_t body_a,
+                                                    uint32_t body_b, hap_detail *detail);
 
 /* [scene] Takes a body with its geoms and joints away. What a hand feels of it ends.
  * HAP_ERROR_NOT_FOUND: there is none of that number. HAP_ERROR_THREAD. */

@@ -108,6 +108,16 @@ static void geoms_drop(hap_scene *scene, uint32_t count)
   }
 }
 
+/* What the def says of it. */
+static void mass_given(const hap_body_def *def, dMass *out)
+{
+  const double(*m)[3] = def->inertia;
+  const double *c = def->centre;
+  dMassSetParameters(out, def->mass, 0.0, 0.0, 0.0, m[0][0], m[1][1], m[2][2], m[0][1], m[0][2],
+                     m[1][2]);
+  dMassTranslate(out, c[0], c[1], c[2]); /* as geoms have it: about the frame's origin */
+}
+
 /* Behind those that have numbers, and their mass. */
 static hap_status geoms_make(hap_scene *scene, const hap_body_def *def, const hap_geom_def *geoms,
                              dMass *out, hap_detail *detail)
@@ -120,6 +130,9 @@ static hap_status geoms_make(hap_scene *scene, const hap_body_def *def, const ha
       geoms_drop(scene, i);
       return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for the geoms of a body");
     }
+    if (def->has_inertia != 0) {
+      continue;
+    }
     if (!hapi_shape_mass(geom, geoms[i].density, &mass)) {
       geoms_drop(scene, i + 1);
       return hapi_fail(detail, HAP_ERROR_ARGUMENT,
@@ -129,7 +142,9 @@ static hap_status geoms_make(hap_scene *scene, const hap_body_def *def, const ha
     }
     dMassAdd(out, &mass);
   }
-  if (def->mass > 0.0) {
+  if (def->has_inertia != 0) {
+    mass_given(def, out);
+  } else if (def->mass > 0.0) {
     dMassAdjust(out, def->mass);
   }
   return HAP_OK;
@@ -181,7 +196,7 @@ static void geoms_attach(hap_scene *scene, uint32_t count)
 static hap_status geoms_read(const hap_body_def *def, hap_geom_def *out, hap_detail *detail)
 {
   const unsigned char *bytes = (const unsigned char *)def->geoms;
-  size_t stride = def->geoms[0].size;
+  size_t stride = def->geom_count > 0 ? def->geoms[0].size : 0;
   for (size_t i = 0; i < def->geom_count; ++i) {
     hap_detail why = {""};
     hap_status status = hapi_def_read(&geom_def_type, bytes + i * stride, &out[i], &why);
@@ -196,21 +211,64 @@ static hap_status geoms_read(const hap_body_def *def, hap_geom_def *out, hap_det
   return HAP_OK;
 }
 
+/* By its leading minors, of the smallest size that counts. */
+static bool matrix_positive(const double m[3][3])
+{
+  const double minor = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+  const double all = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                     m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+                     m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+  return m[0][0] > 0.0 && minor > 0.0 && all > 0.0;
+}
+
+/* NULL: a body can have it. Principal moments are those of sum * 1 - 2 * m as well, none of which
+ * is below 0 where none exceeds the sum of the others. */
+static const char *inertia_wrong(const double m[3][3])
+{
+  const double sum = m[0][0] + m[1][1] + m[2][2];
+  const double slack = 1e-9 * sum; /* of rounding: a thin plate has equality */
+  const double s[3][3] = {
+      {sum - 2 * m[0][0] + slack, -2 * m[0][1], -2 * m[0][2]},
+      {-2 * m[0][1], sum - 2 * m[1][1] + slack, -2 * m[1][2]},
+      {-2 * m[0][2], -2 * m[1][2], sum - 2 * m[2][2] + slack},
+  };
+  if (m[0][1] != m[1][0] || m[0][2] != m[2][0] || m[1][2] != m[2][1]) {
+    return "inertia is not symmetric";
+  }
+  return !matrix_positive(m)   ? "inertia is not positive definite"
+         : !matrix_positive(s) ? "inertia: a principal moment exceeds the sum of the other two"
+                               : NULL;
+}
+
+static hap_status own_inertia_check(const hap_body_def *def, hap_detail *detail)
+{
+  const char *wrong = !(def->mass > 0.0)                ? "mass is 0"
+                      : !hapi_plausible(def->centre, 3) ? "centre: not finite or beyond 1000 km"
+                      : !hapi_finite(&def->inertia[0][0], 9) ? "inertia is not finite"
+                                                             : inertia_wrong(def->inertia);
+  return wrong == NULL ? HAP_OK
+                       : hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s, where has_inertia is 1", wrong);
+}
+
 static hap_status body_check(const hap_body_def *def, hap_detail *detail)
 {
   const hapi_number_rule rules[] = {
       HAPI_RULE(def, mass, 0.0, 1e9),
       HAPI_RULE(def, is_kinematic, 0, 1),
-      HAPI_RULE(def, geom_count, 1, GEOMS_MOST),
+      HAPI_RULE(def, has_inertia, 0, 1),
+      HAPI_RULE(def, geom_count, def->has_inertia != 0 ? 0 : 1, GEOMS_MOST),
   };
   HAPI_TRY(hapi_numbers_check(rules, sizeof rules / sizeof rules[0], detail));
   const char *wrong =
-      def->geoms == NULL                 ? "geoms is NULL"
-      : !hapi_plausible_pose(&def->pose) ? "pose: not within 1000 km with a unit quaternion"
+      def->geoms == NULL && def->geom_count > 0 ? "geoms is NULL"
+      : !hapi_plausible_pose(&def->pose)        ? "pose: not within 1000 km with a unit quaternion"
       : !(hapi_plausible(def->twist.linear, 3) && hapi_plausible(def->twist.angular, 3))
           ? "twist: not finite or beyond 1e6 m/s or rad/s"
           : NULL;
-  return wrong == NULL ? HAP_OK : hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s", wrong);
+  if (wrong != NULL) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s", wrong);
+  }
+  return def->has_inertia != 0 ? own_inertia_check(def, detail) : HAP_OK;
 }
 
 static hap_status body_add(hap_scene *scene, const hap_body_def *def, const hap_geom_def *geoms,
@@ -218,8 +276,9 @@ static hap_status body_add(hap_scene *scene, const hap_body_def *def, const hap_
 {
   dMass mass;
   uint32_t count = (uint32_t)def->geom_count;
-  if (!geoms_reserve(scene, count) || !hapi_reserve((void **)&scene->bodies, &scene->body_capacity,
-                                                    scene->body_count, 1, sizeof *scene->bodies)) {
+  if (!geoms_reserve(scene, count > 0 ? count : 1) ||
+      !hapi_reserve((void **)&scene->bodies, &scene->body_capacity, scene->body_count, 1,
+                    sizeof *scene->bodies)) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a body");
   }
   HAPI_TRY(geoms_make(scene, def, geoms, &mass, detail));
@@ -239,7 +298,7 @@ hap_status hap_scene_add_body(hap_scene *scene, const hap_body_def *given, uint3
   HAPI_TRY(hapi_def_read(&body_def_type, given, &def, detail));
   HAPI_TRY(body_check(&def, detail));
   HAPI_TRY(hapi_scene_may_edit(scene, detail));
-  hap_geom_def *geoms = hapi_alloc_array(def.geom_count, sizeof *geoms);
+  hap_geom_def *geoms = hapi_alloc_array(def.geom_count + 1, sizeof *geoms);
   hap_status status = geoms == NULL ? hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a body")
                                     : geoms_read(&def, geoms, detail);
   uint32_t first = scene->geom_count;

@@ -79,7 +79,8 @@ static bool surface_of(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
   dBodyID body_b = dGeomGetBody(b);
   if (of_a == NULL || of_b == NULL || body_a == body_b ||
       (body_a != NULL && body_b != NULL &&
-       dAreConnectedExcluding(body_a, body_b, dJointTypeContact))) {
+       dAreConnectedExcluding(body_a, body_b, dJointTypeContact)) ||
+      hapi_scene_passes(scene, body_a, body_b)) {
     return false;
   }
   io->mode = dContactApprox1;

@@ -46,6 +46,12 @@ typedef struct hapi_scene_joint {
   hap_joint_kind kind;
 } hapi_scene_joint;
 
+/* Two bodies that pass through each other, the smaller number first. */
+typedef struct hapi_scene_pass {
+  uint32_t a;
+  uint32_t b;
+} hapi_scene_pass;
+
 struct hap_scene {
   dWorldID world;
   dSpaceID space;
@@ -58,6 +64,9 @@ struct hap_scene {
   uint32_t geom_capacity;
   uint32_t joint_count;
   uint32_t joint_capacity;
+  hapi_scene_pass *passes; /* rising by a, then b */
+  uint32_t pass_count;
+  uint32_t pass_capacity;
   struct scene *built_in;              /* owns world and space; NULL: they are ours */
   void (*end_world)(hap_scene *scene); /* of a built-in scene */
   double hull[8][3];                   /* of the hands of a built-in scene */
@@ -79,6 +88,9 @@ void hapi_scene_geom_end(hapi_scene_geom *geom); /* with ODE's geom */
 
 /* built_in.c */
 uint32_t hapi_scene_hands(const hap_scene *of); /* that it was made for */
+
+/* passes.c */
+bool hapi_scene_passes(const hap_scene *scene, dBodyID a, dBodyID b);
 
 /* shapes.c */
 hap_status hapi_shape_check(const hap_geom_def *def, bool of_body, hap_detail *detail);

@@ -26,6 +26,7 @@ def because(reason, names):
 NO_PROGRAM = {
     **because("a name for people, or defaults of a struct", """
         hap_event_name hap_force_kind_name hap_grab_def_init hap_scene_def_init"""),
+    "hap_scene_let_pass": "for who makes a scene from a file",
 }
 
 
