@@ -10,7 +10,7 @@ import sys
 
 import lint
 
-FOLDERS = ("lib", "plugins", "scenes", "view", "tools", "bench", "examples")
+FOLDERS = ("lib", "plugins", "scenes", "view", "import", "tools", "bench", "examples")
 OPTIONS = [
     "--std=c11", "--enable=warning,performance,portability", "--inline-suppr", "--quiet",
     "--error-exitcode=1", "--template={file}:{line}: {message} [{id}]",

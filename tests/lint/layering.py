@@ -49,6 +49,7 @@ LAYERS = {
     "plugins/*": ["lib/base", "plugins/common"],
     "scenes": [],
     "view": [],
+    "import": ["lib/base"],
     "examples": [],
     "tools": ["*"],
     "tools/conform": ["*"],

@@ -6,7 +6,8 @@ import re
 import subprocess
 import sys
 
-CODE_DIRS = ("include", "lib", "plugins", "scenes", "view", "tools", "bench", "examples", "tests")
+CODE_DIRS = ("include", "lib", "plugins", "scenes", "view", "import", "tools", "bench",
+             "examples", "tests")
 SHOWN_MAX = 40  # problems printed per test point
 
 

@@ -1,0 +1,273 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "import/build.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/log.h"
+#include "base/pose.h"
+#include "base/vec.h"
+
+#define BETWEEN_SHARE 0.05 /* of a body's mass, of each body between its joints */
+
+static hap_status build_fail(import_work *work, import_place at, hap_status status,
+                             const hap_detail *why)
+{
+  return hapi_fail(work->detail, status, "%.200s:%d: %.280s", at.file, at.line, why->text);
+}
+
+/* ---- geoms ---- */
+
+/* False: not as a geom of that body. */
+static bool geom_fill(const import_geom *geom, const hap_pose *frame, hap_geom_def *out)
+{
+  const double *s = geom->size;
+  hap_geom_def_init(out, sizeof *out);
+  import_pose_join(frame, &geom->pose, &out->pose);
+  out->friction = geom->friction;
+  out->category_bits = geom->category_bits;
+  out->collide_bits = geom->collide_bits;
+  memcpy(out->colour_rgba, geom->colour_rgba, sizeof out->colour_rgba);
+  switch (geom->shape) {
+    case IMPORT_PLANE:
+      out->shape = HAP_SHAPE_PLANE;
+      return true;
+    case IMPORT_SPHERE:
+      out->shape = HAP_SHAPE_SPHERE;
+      out->radius = s[0];
+      return true;
+    case IMPORT_CAPSULE:
+    case IMPORT_CYLINDER:
+      out->shape = geom->shape == IMPORT_CAPSULE ? HAP_SHAPE_CAPSULE : HAP_SHAPE_CYLINDER;
+      out->radius = s[0];
+      out->length = 2.0 * s[1];
+      return true;
+    case IMPORT_BOX:
+      out->shape = HAP_SHAPE_BOX;
+      hapi_v3_scale(2.0, s, out->edges);
+      return true;
+    case IMPORT_ELLIPSOID:
+    case IMPORT_MESH:
+      out->shape = HAP_SHAPE_MESH;
+      break;
+  }
+  if (geom->mesh == NULL) {
+    return false;
+  }
+  out->vertices_xyz = geom->mesh->vertices_xyz;
+  out->vertex_count = geom->mesh->vertex_count;
+  out->triangles = geom->mesh->triangles;
+  out->triangle_count = geom->mesh->triangle_count;
+  return true;
+}
+
+static hap_status fixed_geoms_add(import_work *work, const import_body *body, hap_scene *scene)
+{
+  for (const import_geom *geom = body->geoms; geom != NULL; geom = geom->next) {
+    hap_geom_def def;
+    hap_detail why = {""};
+    if (!geom_fill(geom, &body->pose_world, &def)) {
+      import_note(work, geom->at, "geom left out: its shape");
+      continue;
+    }
+    hap_status status = hap_scene_add_geom(scene, &def, NULL, &why);
+    if (status < HAP_OK) {
+      return build_fail(work, geom->at, status, &why);
+    }
+  }
+  return HAP_OK;
+}
+
+static size_t geoms_count(const import_model *model, const import_body *carrier)
+{
+  size_t count = 0;
+  for (const import_body *body = model->bodies; body != NULL; body = body->next) {
+    for (const import_geom *geom = body->carrier == carrier ? body->geoms : NULL; geom != NULL;
+         geom = geom->next) {
+      ++count;
+    }
+  }
+  return count;
+}
+
+static size_t geoms_fill(import_work *work, const import_model *model, const import_body *carrier,
+                         hap_geom_def *out)
+{
+  const hap_pose *frame = &carrier->pose_world;
+  size_t count = 0;
+  for (const import_body *body = model->bodies; body != NULL; body = body->next) {
+    hap_pose inside;
+    if (body->carrier != carrier) {
+      continue;
+    }
+    hapi_pose_into(frame->position, frame->quat_wxyz, &body->pose_world, &inside);
+    for (const import_geom *geom = body->geoms; geom != NULL; geom = geom->next) {
+      if (geom->shape == IMPORT_PLANE || !geom_fill(geom, &inside, &out[count])) {
+        import_note(work, geom->at, "geom left out: %s",
+                    geom->shape == IMPORT_PLANE ? "a plane of a body that moves" : "its shape");
+      } else {
+        ++count;
+      }
+    }
+  }
+  return count;
+}
+
+/* ---- bodies ---- */
+
+static void mass_fill(const import_mass *mass, double share, hap_body_def *out)
+{
+  out->has_inertia = 1;
+  out->mass = share * mass->mass;
+  hapi_v3_copy(mass->centre, out->centre);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      out->inertia[i][k] = 0.5 * share * (mass->inertia[3 * i + k] + mass->inertia[3 * k + i]);
+    }
+  }
+}
+
+static size_t joints_count(const import_body *body)
+{
+  size_t count = 0;
+  for (const import_joint *joint = body->joints; joint != NULL; joint = joint->next) {
+    ++count;
+  }
+  return count;
+}
+
+/* A motor's rotor turns along: exact for a hinge on what never moves. The same about all axes, of
+ * which the hinge leaves one, so that it stays the inertia of a real body. */
+static void armature_add(import_work *work, import_body *body)
+{
+  for (const import_joint *joint = body->joints; joint != NULL; joint = joint->next) {
+    if (joint->armature == 0.0) {
+      continue;
+    }
+    if (joint->kind != IMPORT_HINGE || body->joints->next != NULL ||
+        body->parent->carrier->parent != NULL || !(joint->armature > 0.0)) {
+      import_note(work, joint->at, "joint %.60s: armature left out", joint->name);
+      continue;
+    }
+    for (int k = 0; k < 9; k += 4) {
+      body->whole.inertia[k] += joint->armature;
+    }
+  }
+}
+
+static hap_status part_add(import_work *work, import_body *body, const hap_body_def *def,
+                           hap_scene *scene, uint32_t *out)
+{
+  hap_detail why = {""};
+  hap_status status = hap_scene_add_body(scene, def, out, NULL, &why);
+  return status < HAP_OK ? build_fail(work, body->at, status, &why) : HAP_OK;
+}
+
+/* ---- joints ---- */
+
+/* ODE's hinges turn less than half a turn to a stop. */
+static void limits_fill(import_work *work, const import_joint *joint, hap_joint_def *out)
+{
+  const double most = joint->kind == IMPORT_SLIDER ? INFINITY : M_PI;
+  out->low[0] = joint->low >= -most ? joint->low : -INFINITY;
+  out->high[0] = joint->high <= most ? joint->high : INFINITY;
+  if ((out->low[0] != joint->low || out->high[0] != joint->high)) {
+    import_note(work, joint->at, "joint %.60s: limits beyond half a turn left out", joint->name);
+  }
+}
+
+static hap_status joint_add(import_work *work, const import_body *body, const import_joint *joint,
+                            const uint32_t ends[2], hap_scene *scene)
+{
+  static const hap_joint_kind kinds[] = {[IMPORT_FREE] = HAP_JOINT_OTHER,
+                                         [IMPORT_BALL] = HAP_JOINT_BALL,
+                                         [IMPORT_HINGE] = HAP_JOINT_HINGE,
+                                         [IMPORT_SLIDER] = HAP_JOINT_SLIDER};
+  const hap_pose *frame = &body->pose_world;
+  hap_joint_def def;
+  hap_detail why = {""};
+  hap_joint_def_init(&def, sizeof def);
+  def.kind = kinds[joint->kind];
+  def.body_a = ends[0];
+  def.body_b = ends[1];
+  hapi_pose_point(frame->position, frame->quat_wxyz, joint->anchor, def.anchor);
+  hapi_quat_rotate(frame->quat_wxyz, joint->axis, def.axis[0]);
+  if (joint->kind != IMPORT_BALL) {
+    limits_fill(work, joint, &def);
+    def.motor_force[0] = joint->friction;
+  } else if (joint->friction > 0.0) {
+    import_note(work, joint->at, "joint %.60s: friction of a ball joint left out", joint->name);
+  }
+  hap_status status = hap_scene_add_joint(scene, &def, NULL, &why);
+  return status < HAP_OK ? build_fail(work, joint->at, status, &why) : HAP_OK;
+}
+
+/* The body with its joints. The first joint stands on the parent, each further one on the body that
+ * the joint before it moves. */
+static hap_status carrier_add(import_work *work, const import_model *model, import_body *body,
+                              hap_scene *scene)
+{
+  hap_body_def def;
+  const size_t joints = joints_count(body);
+  const import_body *parent = body->parent->carrier;
+  const uint32_t parent_number = parent->parent == NULL ? HAP_SCENE_WORLD : parent->number;
+  uint32_t below = parent_number;
+  hap_geom_def *geoms = import_take(work, (geoms_count(model, body) + 1) * sizeof *geoms);
+  if (geoms == NULL) {
+    return import_no_memory(work);
+  }
+  if (!(body->whole.mass > 0.0)) {
+    return import_refuse(work, body->at, "body %.60s moves and has no mass", body->name);
+  }
+  armature_add(work, body);
+  hap_body_def_init(&def, sizeof def);
+  def.pose = body->pose_world;
+  const import_joint *joint = body->joints;
+  mass_fill(&body->whole, BETWEEN_SHARE, &def);
+  for (; joint->next != NULL; joint = joint->next) {
+    uint32_t between;
+    HAPI_TRY(part_add(work, body, &def, scene, &between));
+    HAPI_TRY(joint_add(work, body, joint, (const uint32_t[2]){between, below}, scene));
+    below = between;
+  }
+  mass_fill(&body->whole, 1.0 - BETWEEN_SHARE * (double)(joints - 1), &def);
+  def.geoms = geoms;
+  def.geom_count = geoms_fill(work, model, body, geoms);
+  HAPI_TRY(part_add(work, body, &def, scene, &body->number));
+  if (joint->kind != IMPORT_FREE) {
+    HAPI_TRY(joint_add(work, body, joint, (const uint32_t[2]){body->number, below}, scene));
+  }
+  if (joints > 1 && parent_number != HAP_SCENE_WORLD) {
+    return hap_scene_let_pass(scene, body->number, parent_number, work->detail);
+  }
+  return HAP_OK;
+}
+
+static hap_status passes_add(import_work *work, const import_model *model, hap_scene *scene)
+{
+  for (const import_pass *pass = model->passes; pass != NULL; pass = pass->next) {
+    const import_body *a = pass->a->carrier;
+    const import_body *b = pass->b->carrier;
+    if (a->parent == NULL || b->parent == NULL) {
+      import_note(work, a->at,
+                  "bodies %.60s and %.60s that do not touch: one never moves, left out",
+                  pass->a->name, pass->b->name);
+    } else if (a != b) {
+      HAPI_TRY(hap_scene_let_pass(scene, a->number, b->number, work->detail));
+    }
+  }
+  return HAP_OK;
+}
+
+hap_status import_build(import_work *work, import_model *model, hap_scene *scene)
+{
+  for (import_body *body = model->bodies; body != NULL; body = body->next) {
+    if (body->carrier->parent == NULL) {
+      HAPI_TRY(fixed_geoms_add(work, body, scene));
+    } else if (body->carrier == body) {
+      HAPI_TRY(carrier_add(work, model, body, scene));
+    }
+  }
+  return passes_add(work, model, scene);
+}

@@ -1,0 +1,521 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Scenes from files: small texts, each aimed at one thing. What they come to is held against
+ * MuJoCo's own compiler, where it is there, and against figures by hand. */
+
+#include "tests/tap.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#ifdef HAPODE_ORACLE
+#include <mujoco/mujoco.h>
+#endif
+
+#include "base/vec.h"
+#include "import/import.h"
+#include "tests/files.h"
+
+#define NEAR 1e-6
+
+SET_UP
+{
+  return folder_make();
+}
+
+typedef struct noted {
+  char lines[4000];
+  size_t length;
+} noted;
+
+static void note_take(void *user, const char *line)
+{
+  noted *to = user;
+  if (to->length + strlen(line) + 2 < sizeof to->lines) {
+    to->length +=
+        (size_t)snprintf(to->lines + to->length, sizeof to->lines - to->length, "%s\n", line);
+  }
+}
+
+typedef struct file_case {
+  const char *name;
+  const char *text;
+} file_case;
+
+#define IN_WORLD(text) "<mujoco>\n<worldbody>\n" text "\n</worldbody>\n</mujoco>\n"
+
+static const file_case mjcf_cases[] = {
+    {"shapes_of_uniform_density",
+     IN_WORLD("<geom type='plane' size='1 1 .1'/>"
+              "<body><freejoint/><geom size='.1'/></body>"
+              "<body><freejoint/><geom type='capsule' size='.05 .2'/></body>"
+              "<body><freejoint/><geom type='cylinder' size='.07 .1' density='500'/></body>"
+              "<body><freejoint/><geom type='box' size='.1 .2 .3' mass='3'/></body>"
+              "<body><freejoint/><geom type='ellipsoid' size='.1 .2 .3'/></body>")},
+    {"several_geoms_in_a_body",
+     IN_WORLD("<body pos='1 2 3' euler='10 20 30'><freejoint/><geom size='.1' pos='.1 0 0'/>"
+              "<geom type='box' size='.1 .05 .02' pos='0 .3 .1' euler='30 0 50' mass='2'/>"
+              "<geom type='capsule' size='.03 .2' zaxis='1 1 0' mass='0'/></body>")},
+    {"two_ends", IN_WORLD("<body pos='0 0 1'><freejoint/>"
+                          "<geom type='capsule' size='.05' fromto='0 0 0 .1 .2 .3'/>"
+                          "<geom type='cylinder' size='.05' fromto='.1 0 0 .1 0 -.3'/>"
+                          "<geom type='box' size='.05' fromto='.1 .1 0 -.4 .2 .3'/>"
+                          "<geom type='ellipsoid' size='.05' fromto='.1 .1 0 .4 .2 -.3'/></body>")},
+    {"ways_to_turn", IN_WORLD("<body quat='1 2 3 4'><geom size='.1'/><joint/></body>"
+                              "<body axisangle='1 2 3 40'><geom size='.1'/><joint/></body>"
+                              "<body xyaxes='1 1 0 0 2 1'><geom size='.1'/><joint/></body>"
+                              "<body xyaxes='-1 0 0 0 -1 0.1'><geom size='.1'/><joint/></body>"
+                              "<body zaxis='1 -2 .5'><geom size='.1'/><joint/></body>"
+                              "<body zaxis='0 0 -1'><geom size='.1'/><joint/></body>"
+                              "<body euler='10 -20 130'><geom size='.1'/><joint/></body>")},
+    {"radians_and_another_order",
+     "<mujoco><compiler angle='radian' eulerseq='ZXz'/><worldbody>"
+     "<body euler='.1 .2 .3'><geom size='.1'/><joint range='-.5 1' limited='true'/>"
+     "<body euler='1 -.2 2' pos='1 0 0'><geom size='.1'/><joint type='slide' axis='1 2 3' "
+     "range='-.5 1' limited='true'/></body></body></worldbody></mujoco>"},
+    {"large_letters",
+     "<mujoco><compiler eulerseq='XYZ'/><worldbody><body euler='10 20 30'><geom size='.1'/>"
+     "<joint/></body></worldbody></mujoco>"},
+    {"classes_of_defaults",
+     "<mujoco><default><geom density='100' size='.1 .2 .3'/><joint axis='1 0 0'/>"
+     "<default class='a'><geom type='box' size='.5'/><joint pos='.1 .2 .3'/>"
+     "<default class='b'><geom pos='1 1 1' mass='4'/><joint range='-10 20' limited='true'/>"
+     "</default></default>"
+     "<default class='c'><geom type='capsule' fromto='0 0 0 0 0 .5'/></default></default>"
+     "<worldbody><body><joint/><geom/>"
+     "<body childclass='a' pos='2 0 0'><joint/><geom/><geom class='b'/>"
+     "<body><joint class='b' axis='0 1 0'/><geom class='c'/><geom size='.2 .1'/>"
+     "<body childclass='b'><joint/><geom/><geom class='main'/></body></body></body></body>"
+     "</worldbody></mujoco>"},
+    {"inertial_stands_over_geoms",
+     IN_WORLD("<body><joint/><inertial pos='.1 .2 .3' mass='2' diaginertia='.1 .2 .25' "
+              "euler='10 20 30'/><geom size='.1'/></body>"
+              "<body pos='1 0 0'><freejoint/><inertial pos='0 0 .1' mass='3' "
+              "fullinertia='.3 .4 .5 .01 -.02 .03'/></body>")},
+    {"inertia_from_geoms_always",
+     "<mujoco><compiler inertiafromgeom='true'/><worldbody>"
+     "<body><joint/><inertial pos='.1 .2 .3' mass='2' diaginertia='.1 .2 .25'/>"
+     "<geom size='.1'/></body></worldbody></mujoco>"},
+    {"inertia_of_some_groups",
+     "<mujoco><compiler inertiagrouprange='1 2'/><worldbody>"
+     "<body><joint/><geom size='.1' group='1'/><geom size='.2' group='0' pos='1 0 0'/>"
+     "<geom size='.1' group='2' pos='0 0 1'/></body></worldbody></mujoco>"},
+    {"a_total_mass",
+     "<mujoco><compiler settotalmass='10'/><worldbody>"
+     "<body><joint/><geom size='.1'/><body pos='1 0 0'><joint/><geom size='.2'/></body></body>"
+     "</worldbody></mujoco>"},
+    {"bounds_of_mass",
+     "<mujoco><compiler boundmass='1' boundinertia='.01'/><worldbody>"
+     "<body><joint/><geom size='.01'/></body><body><joint/><geom size='.3'/></body>"
+     "</worldbody></mujoco>"},
+    {"an_inertia_that_is_balanced",
+     "<mujoco><compiler balanceinertia='true'/><worldbody>"
+     "<body><joint/><inertial pos='0 0 0' mass='1' diaginertia='.1 .1 .4'/></body>"
+     "</worldbody></mujoco>"},
+    {"kinds_of_joints",
+     IN_WORLD("<body><joint type='ball' pos='.1 0 0'/><geom size='.1'/>"
+              "<body pos='0 0 1'><joint type='slide' axis='1 2 3'/><geom size='.1'/></body></body>"
+              "<body><joint type='free'/><geom size='.1'/></body>")},
+    {"several_joints_in_a_body",
+     IN_WORLD("<body><joint type='slide' axis='1 0 0'/><joint type='slide' axis='0 1 0'/>"
+              "<joint axis='0 0 1' pos='.1 0 0'/><geom size='.1'/></body>")},
+    {"a_reference_of_a_joint",
+     IN_WORLD("<body><joint ref='20' range='-30 50' limited='true'/><geom size='.1'/></body>"
+              "<body><joint type='slide' ref='.2' range='-1 2' limited='true'/><geom size='.1'/>"
+              "</body>")},
+    {"bodies_in_bodies_without_joints",
+     IN_WORLD("<body pos='0 0 1' euler='0 30 0'><joint axis='0 1 0'/><geom size='.1'/>"
+              "<body pos='.5 0 0' euler='40 0 0'><geom type='box' size='.1 .2 .3'/>"
+              "<body pos='0 .5 0'><geom size='.2'/></body></body></body>"
+              "<body pos='3 0 0'><geom size='.5'/></body>")},
+    {"more_digits_and_signs",
+     IN_WORLD("<body pos=' +1e-1\t-2.5E+0\n.5 '><joint/><geom size='1.e-1'/></body>")},
+};
+
+static import_model file_read(import_work *work, const char *text)
+{
+  import_model model;
+  hap_detail why = {""};
+  const char *path = folder_path("scene.xml");
+  file_write(path, text);
+  work->detail = &why;
+  hap_status status = import_read(work, path, &model);
+  work->detail = NULL;
+  REQUIRE_SAY(status == HAP_OK, "%s", why.text);
+  return model;
+}
+
+#ifdef HAPODE_ORACLE
+
+static void vectors_check(const char *what, const char *of, const double *ours,
+                          const mjtNum *theirs, int count)
+{
+  for (int k = 0; k < count; ++k) {
+    CHECK_SAY(fabs(ours[k] - theirs[k]) < NEAR, "%s of \"%s\": number %d is %.9g and not %.9g",
+              what, of, k, ours[k], theirs[k]);
+  }
+}
+
+/* Of two signs the one that fits. */
+static void turn_check(const char *what, const char *of, const double *ours, const mjtNum *theirs)
+{
+  double dot = 0.0;
+  double flipped[4];
+  for (int k = 0; k < 4; ++k) {
+    dot += ours[k] * theirs[k];
+  }
+  for (int k = 0; k < 4; ++k) {
+    flipped[k] = dot < 0.0 ? -ours[k] : ours[k];
+  }
+  vectors_check(what, of, flipped, theirs, 4);
+}
+
+static void mass_check(const import_body *body, const mjModel *theirs, int i)
+{
+  mjtNum r[9];
+  double inertia[9];
+  const mjtNum *d = theirs->body_inertia + 3 * i;
+  const double diagonal[9] = {d[0], 0, 0, 0, d[1], 0, 0, 0, d[2]};
+  mju_quat2Mat(r, theirs->body_iquat + 4 * i);
+  hapi_m3_turn(r, diagonal, inertia);
+  vectors_check("mass", body->name, &body->mass.mass, theirs->body_mass + i, 1);
+  if (body->mass.mass > 0.0) {
+    vectors_check("centre", body->name, body->mass.centre, theirs->body_ipos + 3 * i, 3);
+    vectors_check("inertia", body->name, body->mass.inertia, inertia, 9);
+  }
+}
+
+static void joint_check(const import_joint *joint, const mjModel *theirs, int j)
+{
+  static const int kinds[] = {mjJNT_FREE, mjJNT_BALL, mjJNT_HINGE, mjJNT_SLIDE};
+  CHECK_SAY(kinds[joint->kind] == theirs->jnt_type[j], "kind of joint \"%s\"", joint->name);
+  if (joint->kind == IMPORT_FREE) {
+    return;
+  }
+  vectors_check("anchor", joint->name, joint->anchor, theirs->jnt_pos + 3 * j, 3);
+  if (joint->kind != IMPORT_BALL) {
+    vectors_check("axis", joint->name, joint->axis, theirs->jnt_axis + 3 * j, 3);
+    mjtNum zero = theirs->qpos0[theirs->jnt_qposadr[j]];
+    const double range[2] = {joint->low + zero, joint->high + zero};
+    bool limited = theirs->jnt_limited[j] != 0;
+    CHECK_SAY(limited == (isfinite(joint->low) != 0), "limits of joint \"%s\"", joint->name);
+    if (limited) {
+      vectors_check("range", joint->name, range, theirs->jnt_range + 2 * j, 2);
+    }
+  }
+  vectors_check("armature", joint->name, &joint->armature,
+                theirs->dof_armature + theirs->jnt_dofadr[j], 1);
+  vectors_check("friction", joint->name, &joint->friction,
+                theirs->dof_frictionloss + theirs->jnt_dofadr[j], 1);
+}
+
+static void geom_check(const import_geom *geom, const mjModel *theirs, int g)
+{
+  static const int types[] = {mjGEOM_PLANE,    mjGEOM_SPHERE, mjGEOM_CAPSULE,
+                              mjGEOM_CYLINDER, mjGEOM_BOX,    mjGEOM_ELLIPSOID};
+  static const int sizes[] = {0, 1, 2, 2, 3, 3};
+  CHECK_SAY(types[geom->shape] == theirs->geom_type[g], "shape of geom \"%s\"", geom->name);
+  vectors_check("place of geom", geom->name, geom->pose.position, theirs->geom_pos + 3 * g, 3);
+  turn_check("turn of geom", geom->name, geom->pose.quat_wxyz, theirs->geom_quat + 4 * g);
+  vectors_check("size", geom->name, geom->size, theirs->geom_size + 3 * g, sizes[geom->shape]);
+  vectors_check("friction of geom", geom->name, &geom->friction, theirs->geom_friction + 3 * g, 1);
+  CHECK(geom->category_bits == (uint32_t)theirs->geom_contype[g]);
+  CHECK(geom->collide_bits == (uint32_t)theirs->geom_conaffinity[g]);
+  for (int k = 0; k < 4; ++k) {
+    const int material = theirs->geom_matid[g];
+    const float *rgba = material < 0 ? theirs->geom_rgba + 4 * (ptrdiff_t)g
+                                     : theirs->mat_rgba + 4 * (ptrdiff_t)material;
+    CHECK(fabsf(geom->colour_rgba[k] - rgba[k]) < 1e-6F);
+  }
+}
+
+static void model_check(const import_model *ours, const mjModel *theirs, const mjData *data,
+                        bool with_geoms)
+{
+  int i = 0;
+  int j = 0;
+  int g = 0;
+  vectors_check("gravity", ours->name, ours->gravity, theirs->opt.gravity, 3);
+  for (const import_body *body = ours->bodies; body != NULL; body = body->next, ++i) {
+    REQUIRE(i < theirs->nbody);
+    vectors_check("place", body->name, body->pose_world.position, data->xpos + 3 * i, 3);
+    turn_check("turn", body->name, body->pose_world.quat_wxyz, data->xquat + 4 * i);
+    if (i > 0) {
+      mass_check(body, theirs, i);
+    }
+    for (const import_joint *joint = body->joints; joint != NULL; joint = joint->next, ++j) {
+      REQUIRE(j < theirs->njnt);
+      joint_check(joint, theirs, j);
+    }
+    for (const import_geom *geom = body->geoms; geom != NULL && with_geoms;
+         geom = geom->next, ++g) {
+      REQUIRE(g < theirs->ngeom);
+      geom_check(geom, theirs, g);
+    }
+  }
+  CHECK(i == theirs->nbody && j == theirs->njnt && (!with_geoms || g == theirs->ngeom));
+}
+
+static void oracle_check(const char *path, const import_model *ours, bool with_geoms)
+{
+  char error[300] = "";
+  mjModel *theirs = mj_loadXML(path, NULL, error, sizeof error);
+  REQUIRE_SAY(theirs != NULL, "MuJoCo: %s", error);
+  mjData *data = mj_makeData(theirs);
+  mj_kinematics(theirs, data);
+  model_check(ours, theirs, data, with_geoms);
+  mj_deleteData(data);
+  mj_deleteModel(theirs);
+}
+
+#else
+
+static void oracle_check(const char *path, const import_model *ours, bool with_geoms)
+{
+  (void)path, (void)ours, (void)with_geoms;
+  SKIP("MuJoCo is not there to compare with (Debian: libmujoco-dev)");
+}
+
+#endif
+
+TEST_EACH(mjcf_cases, const file_case *row)
+{
+  noted notes = {.length = 0};
+  import_work work = {.said = note_take, .user = &notes};
+  import_model model = file_read(&work, row->text);
+  CHECK_SAY(notes.length == 0, "%s", notes.lines);
+  oracle_check(folder_path("scene.xml"), &model, true);
+  import_work_finish(&work);
+}
+
+/* ---- files of others ---- */
+
+/* NULL: the test is skipped. */
+static const char *other_file(const char *name)
+{
+  static char path[500];
+  const char *folder = getenv("HAPODE_SCENE_FILES");
+  snprintf(path, sizeof path, "%s/%s", folder != NULL ? folder : "", name);
+  if (folder == NULL || !file_exists(path)) {
+    SKIP("no %s: HAPODE_SCENE_FILES names a folder with files of MuJoCo", name);
+  }
+  return path;
+}
+
+TEST(a_humanoid)
+{
+  const char *path = other_file("humanoid.xml");
+  import_model model;
+  hap_detail why = {""};
+  noted notes = {.length = 0};
+  import_work work = {.said = note_take, .user = &notes, .detail = &why};
+  REQUIRE_SAY(import_read(&work, path, &model) == HAP_OK, "%s", why.text);
+  CHECK(strstr(notes.lines, "humanoid.xml:67: joint: damping left out\n") != NULL);
+  CHECK(strstr(notes.lines, "tendon left out, 2 in it\n") != NULL);
+  tap_say("%s", notes.lines);
+  oracle_check(path, &model, true);
+  import_work_finish(&work);
+}
+
+/* ---- the scene that comes of it ---- */
+
+static hap_scene *scene_of(const char *text)
+{
+  hap_scene *scene = NULL;
+  hap_detail why = {""};
+  const char *path = folder_path("scene.xml");
+  file_write(path, text);
+  REQUIRE_SAY(import_scene(path, NULL, &scene, NULL, &why) == HAP_OK, "%s", why.text);
+  return scene;
+}
+
+/* What is rigid is one body, with the mass of all. */
+TEST(bodies_without_joints_are_parts_of_what_carries_them)
+{
+  hap_scene *scene = scene_of(IN_WORLD(
+      "<body pos='0 0 1'><joint axis='0 1 0'/><geom size='.1' mass='1'/>"
+      "<body pos='.5 0 0'><geom size='.1' mass='2'/></body></body><body><geom size='.5'/></body>"));
+  hap_scene_counts counts;
+  hap_scene_body body;
+  REQUIRE(hap_scene_count(scene, &counts, sizeof counts) == HAP_OK);
+  CHECK(counts.bodies == 1 && counts.geoms == 3 && counts.joints == 1);
+  REQUIRE(hap_scene_get_body(scene, 0, &body, sizeof body) == HAP_OK);
+  CHECK_NEAR(body.mass, 3.0, 1e-12);
+  CHECK_NEAR(body.centre[0], 1.0 / 3.0, 1e-12);
+  /* two balls, and their centres apart: m1 m2 / (m1 + m2) d^2 */
+  CHECK_NEAR(body.inertia[2][2], 0.4 * 0.01 * 3.0 + 2.0 / 3.0 * 0.25, 1e-12);
+  CHECK_NEAR(body.inertia[0][0], 0.4 * 0.01 * 3.0, 1e-12);
+  CHECK_NEAR(body.pose.position[2], 1.0, 1e-12);
+  CHECK(hap_scene_destroy(scene) == HAP_OK);
+}
+
+static hap_session *session_over(hap_scene *scene)
+{
+  hap_session_def def;
+  hap_session *session = NULL;
+  hap_detail why = {""};
+  hap_session_def_init(&def, sizeof def);
+  def.drive = HAP_DRIVE_LOCKSTEP;
+  REQUIRE_SAY(hap_scene_session(scene, &def, &session, &why) == HAP_OK, "%s", why.text);
+  return session;
+}
+
+/* A joint falls to its stop: which end it is hangs on the signs of range and axis. */
+typedef struct stop_case {
+  const char *name;
+  const char *joint; /* of a rod along x from its own end on */
+  double gravity;    /* along z */
+  double x;          /* m, where its tip comes to rest */
+  double z;
+} stop_case;
+
+static const stop_case stop_cases[] = {
+    {"a_hinge_falls_to_its_high_stop", "axis='0 1 0' range='-20 30'", -9.81, 0.8660254, -0.5},
+    {"a_hinge_rises_to_its_low_stop", "axis='0 1 0' range='-20 30'", 9.81, 0.9396926, 0.3420201},
+    {"a_hinge_turned_round", "axis='0 -1 0' range='-20 30'", -9.81, 0.9396926, -0.3420201},
+    {"a_slider_falls_to_its_low_stop", "type='slide' axis='0 0 1' range='-.2 .3'", -9.81, 1.0,
+     -0.2},
+    {"a_slider_rises_to_its_high_stop", "type='slide' axis='0 0 1' range='-.2 .3'", 9.81, 1.0, 0.3},
+    {"a_hinge_with_a_reference", "axis='0 1 0' ref='10' range='-20 30'", -9.81, 0.9396926,
+     -0.3420201},
+};
+
+static void stop_check(const stop_case *row, const char *above)
+{
+  char text[1000];
+  hap_scene_body body;
+  hap_scene_counts counts;
+  snprintf(text, sizeof text,
+           "<mujoco><option gravity='0 0 %g'/><worldbody>%s<body><joint %s/>"
+           "<geom type='capsule' size='.02' fromto='0 0 0 1 0 0'/></body>%s</worldbody></mujoco>",
+           row->gravity, above[0] != '\0' ? above : "", row->joint,
+           above[0] != '\0' ? "</body>" : "");
+  hap_scene *scene = scene_of(text);
+  hap_session *session = session_over(scene);
+  REQUIRE(hap_session_start(session) == HAP_OK);
+  CHECK(hap_session_advance(session, 4000) >= HAP_OK);
+  REQUIRE(hap_scene_count(scene, &counts, sizeof counts) == HAP_OK);
+  REQUIRE(hap_scene_get_body(scene, counts.bodies - 1, &body, sizeof body) == HAP_OK);
+  double tip[3];
+  hapi_pose_point(body.pose.position, body.pose.quat_wxyz, (const double[3]){1.0, 0.0, 0.0}, tip);
+  CHECK_NEAR(tip[0], row->x, 0.01);
+  CHECK_NEAR(tip[2], row->z, 0.01);
+  hap_session_destroy(session);
+  CHECK(hap_scene_destroy(scene) == HAP_OK);
+}
+
+TEST_EACH(stop_cases, const stop_case *row)
+{
+  stop_check(row, "");
+  /* The same on a body that a slider across holds. */
+  stop_check(row,
+             "<body><joint type='slide' axis='0 1 0'/><geom size='.1' mass='1000' "
+             "contype='0' conaffinity='0'/>");
+}
+
+/* ---- what is left out, and what is refused ---- */
+
+static const struct {
+  const char *text;
+  const char *line;
+} left_out[] = {
+    {IN_WORLD("<body>\n<joint stiffness='3'/><geom size='.1'/></body>"),
+     "scene.xml:4: joint: stiffness left out\n"},
+    {"<mujoco>\n<actuator>\n<motor/><motor/></actuator></mujoco>",
+     "scene.xml:2: actuator left out, 2 in it\n"},
+    {IN_WORLD("<geom type='sdf'/>"), "scene.xml:3: geom without a name left out, and its mass"},
+    {IN_WORLD("<body gravcomp='1'><joint/><geom size='.1'/></body>"),
+     "scene.xml:3: body: gravcomp left out\n"},
+    {IN_WORLD("<pony/>"), "scene.xml:3: pony left out\n"},
+};
+
+TEST(what_is_left_out_is_told_with_its_line)
+{
+  for (size_t i = 0; i < sizeof left_out / sizeof left_out[0]; ++i) {
+    noted notes = {.length = 0};
+    hap_detail why = {""};
+    import_options options = {.said = note_take, .user = &notes};
+    hap_scene *scene = NULL;
+    size_t count = 0;
+    file_write(folder_path("scene.xml"), left_out[i].text);
+    CHECK_SAY(import_scene(folder_path("scene.xml"), &options, &scene, &count, &why) == HAP_OK,
+              "%s", why.text);
+    CHECK_SAY(strstr(notes.lines, left_out[i].line) != NULL, "%s", notes.lines);
+    CHECK(count == 1);
+    CHECK(hap_scene_destroy(scene) == HAP_OK);
+    options.strict = true;
+    CHECK(import_scene(folder_path("scene.xml"), &options, &scene, NULL, &why) == HAP_ERROR_FORMAT);
+    CHECK(scene == NULL);
+    size_t line = strcspn(left_out[i].line, "\n");
+    CHECK_SAY(strncmp(why.text, left_out[i].line, line) == 0, "%s", why.text);
+  }
+}
+
+static const struct {
+  const char *text;
+  const char *says;
+} refusals[] = {
+    {"", "scene.xml:1: no XML"},
+    {"<mujoco>\n<worldbody>\n</mujoco>", "scene.xml:3: no XML"},
+    {"<html/>", "scene.xml:1: <html>"},
+    {"<!DOCTYPE m [\n<!ENTITY a 'b'>\n<!ENTITY c '&a;&a;'>]>\n<mujoco/>",
+     "scene.xml:1: a document type"},
+    {IN_WORLD("<flexcomp/>"), "scene.xml:3: flexcomp"},
+    {IN_WORLD("<body><composite/></body>"), "scene.xml:3: composite"},
+    {"<mujoco>\n<extension>\n<plugin/></extension></mujoco>", "scene.xml:3: plugin"},
+    {"<mujoco>\n<asset>\n<skin/></asset></mujoco>", "scene.xml:3: skin"},
+    {IN_WORLD("<body pos='1 2'/>"), "scene.xml:3: pos: 2 numbers"},
+    {IN_WORLD("<body pos='1 2 3 4'/>"), "scene.xml:3: pos: more than 3"},
+    {IN_WORLD("<body pos='1 2 nan'/>"), "scene.xml:3: pos: \"nan\" is no number"},
+    {IN_WORLD("<body pos='1 2 3e99'/>"), "scene.xml:3: pos: a number beyond"},
+    {IN_WORLD("<body quat='0 0 0 0'/>"), "scene.xml:3: quat: has no direction"},
+    {IN_WORLD("<geom size='-1'/>"), "scene.xml:3: size: number 1"},
+    {IN_WORLD("<geom type='egg'/>"), "scene.xml:3: type: \"egg\" is none of"},
+    {IN_WORLD("<geom class='none'/>"), "scene.xml:3: class: there is no class none"},
+    {IN_WORLD("<body>\n<joint/></body>"), "scene.xml:3: body  moves and has no mass"},
+    {IN_WORLD("<joint/>"), "scene.xml:3: a joint of the world"},
+    {IN_WORLD("<body><joint range='1 0'/><geom size='.1'/></body>"), "scene.xml:3: range"},
+    {"<mujoco>\n<contact><exclude body1='a' body2='b'/></contact></mujoco>",
+     "scene.xml:2: body1: there is no body a"},
+    {"<mujoco><compiler eulerseq='xyq'/></mujoco>", "scene.xml:1: eulerseq"},
+    {"<mujoco><compiler coordinate='global'/></mujoco>", "scene.xml:1: coordinate"},
+};
+
+TEST(what_cannot_be_is_refused_with_its_line)
+{
+  for (size_t i = 0; i < sizeof refusals / sizeof refusals[0]; ++i) {
+    hap_detail why = {""};
+    hap_scene *scene = (hap_scene *)&why; /* must be overwritten */
+    file_write(folder_path("scene.xml"), refusals[i].text);
+    CHECK_SAY(import_scene(folder_path("scene.xml"), NULL, &scene, NULL, &why) == HAP_ERROR_FORMAT,
+              "%s", refusals[i].text);
+    CHECK(scene == NULL);
+    CHECK_SAY(strncmp(why.text, refusals[i].says, strlen(refusals[i].says)) == 0, "%s", why.text);
+  }
+  hap_detail why = {""};
+  hap_scene *scene = NULL;
+  CHECK(import_scene(folder_path("none.xml"), NULL, &scene, NULL, &why) == HAP_ERROR_NOT_FOUND);
+  CHECK(strstr(why.text, "none.xml: cannot be read") != NULL);
+}
+
+/* A tree of a hundred thousand elements inside each other ends at the limit. */
+TEST(depth_has_a_limit)
+{
+  enum {
+    LEVELS = 100000
+  };
+  char *text = malloc(6 * LEVELS + 20);
+  REQUIRE(text != NULL);
+  memcpy(text, "<mujoco>", 9);
+  for (size_t i = 0; i < LEVELS; ++i) {
+    memcpy(text + 8 + 6 * i, "<body>", 7);
+  }
+  hap_detail why = {""};
+  hap_scene *scene = NULL;
+  file_write(folder_path("scene.xml"), text);
+  free(text);
+  CHECK(import_scene(folder_path("scene.xml"), NULL, &scene, NULL, &why) == HAP_ERROR_FORMAT);
+  CHECK_SAY(strcmp(why.text, "scene.xml:1: more than 256 levels") == 0, "%s", why.text);
+}
