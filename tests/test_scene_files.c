@@ -16,13 +16,13 @@
 
 #include "base/vec.h"
 #include "import/import.h"
-#include "tests/files.h"
+#include "tests/program.h"
 
 #define NEAR 1e-6
 
 SET_UP
 {
-  return folder_make();
+  return program_use("HAPODE_RUN");
 }
 
 typedef struct noted {
@@ -296,10 +296,10 @@ TEST_EACH(mjcf_cases, const file_case *row)
 static const char *other_file(const char *name)
 {
   static char path[500];
-  const char *folder = getenv("HAPODE_SCENE_FILES");
-  snprintf(path, sizeof path, "%s/%s", folder != NULL ? folder : "", name);
+  const char *folder = getenv("HAPODE_SHARED");
+  snprintf(path, sizeof path, "%s/scenes/%s", folder != NULL ? folder : "", name);
   if (folder == NULL || !file_exists(path)) {
-    SKIP("no %s: HAPODE_SCENE_FILES names a folder with files of MuJoCo", name);
+    SKIP("no %s of MuJoCo in the folder scenes of HAPODE_SHARED", name);
   }
   return path;
 }
@@ -314,7 +314,6 @@ TEST(a_humanoid)
   REQUIRE_SAY(import_read(&work, path, &model) == HAP_OK, "%s", why.text);
   CHECK(strstr(notes.lines, "humanoid.xml:67: joint: damping left out\n") != NULL);
   CHECK(strstr(notes.lines, "tendon left out, 2 in it\n") != NULL);
-  tap_say("%s", notes.lines);
   oracle_check(path, &model, true);
   import_work_finish(&work);
 }
@@ -518,4 +517,48 @@ TEST(depth_has_a_limit)
   free(text);
   CHECK(import_scene(folder_path("scene.xml"), NULL, &scene, NULL, &why) == HAP_ERROR_FORMAT);
   CHECK_SAY(strcmp(why.text, "scene.xml:1: more than 256 levels") == 0, "%s", why.text);
+}
+
+/* ---- hapode-run ---- */
+
+static const char robot[] =
+    "<mujoco>\n<worldbody>\n"
+    "<geom type='plane' size='1 1 .1'/>\n"
+    "<body pos='0 0 .3'><freejoint/><geom type='box' size='.1 .1 .05'/>\n"
+    "<body pos='.15 0 0'><joint axis='0 1 0' damping='.1'/><joint axis='0 0 1'/>\n"
+    "<geom type='capsule' size='.03' fromto='0 0 0 .2 0 0'/></body>\n"
+    "</body></worldbody></mujoco>\n";
+
+TEST(hapode_run_loads_a_file)
+{
+  file_write(folder_path("robot.xml"), robot);
+  CHECK(run("--scene %s --lockstep --seconds 4", folder_path("robot.xml")) == 0);
+  CHECK_SAY(says("robot.xml:5: joint: damping left out\n"), "%s", ran.err);
+  CHECK_SAY(strstr(ran.out, "\nfault: none\n") != NULL, "%s", ran.out);
+  CHECK(strstr(ran.out, "\npeak_force_n: 0\n") == NULL); /* the hand finds it */
+  CHECK(run("--scene %s --lockstep --seconds 1 --strict", folder_path("robot.xml")) == 1);
+  CHECK_SAY(says("hapode-run: --scene: robot.xml:5: joint: damping left out\n"), "%s", ran.err);
+  CHECK(run("--scene %s", folder_path("none.xml")) == 2);
+  CHECK(run("--scene row10 --strict") == 2);
+}
+
+/* A hand that goes through all of it for a minute, at three heights. */
+static void poke_for_a_minute(const char *path)
+{
+  char device[4000] = "virtual:path=0:-1/0/0.1";
+  size_t used = strlen(device);
+  for (int i = 1; i < 60; ++i) {
+    const double x = 0.5 * sin(2.4 * i);
+    const double y = 0.5 * sin(1.7 * i + 1.0);
+    used += (size_t)snprintf(device + used, sizeof device - used, ";%d:%.3f/%.3f/%.3f", i, x, y,
+                             0.02 + 0.06 * (i % 3));
+  }
+  CHECK(run("--scene %s --lockstep --seconds 60 --device %s", path, device) == 0);
+  CHECK_SAY(strstr(ran.out, "\nfault: none\n") != NULL, "%s", ran.out);
+  CHECK(strstr(ran.out, "\npeak_force_n: 0\n") == NULL);
+}
+
+TEST(a_humanoid_is_poked_for_a_minute)
+{
+  poke_for_a_minute(other_file("humanoid.xml"));
 }

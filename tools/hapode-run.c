@@ -20,6 +20,7 @@
 #include "tools/run_loop.h"
 #include "tools/run_options.h"
 #include "tools/run_recording.h"
+#include "tools/run_scene_file.h"
 #include "tools/run_summary.h"
 #include "tools/run_window.h"
 
@@ -330,15 +331,18 @@ static int check_device(run_options *options)
 
 static int run_world(run_options *options, const run_recording *recording)
 {
-  rig r;
+  rig r = {.failed = RIG_SCENE};
+  run_scene_file file;
   hap_detail detail = {""};
   dInitODE2(0);
   run_stage_prepare(options->window.stage, options);
-  hap_status status = rig_create(&options->rig, &r, &detail);
+  hap_status status = run_scene_file_open(options, &file, &detail);
+  status = status >= HAP_OK ? rig_create(&options->rig, &r, &detail) : status;
   int code = status < HAP_OK ? run_refuse(&r, status, &detail) : run_in(options, &r, recording);
   if (status >= HAP_OK) {
     rig_destroy(&r);
   }
+  run_scene_file_close(&file);
   dCloseODE();
   return code;
 }

@@ -3,10 +3,12 @@
 #include "tools/rig.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/log.h"
 #include "device/device.h"
+#include "scene/scene_internal.h"
 
 void rig_options_init(rig_options *options)
 {
@@ -200,7 +202,8 @@ static hap_status create_session(const rig_options *options, rig *r, hap_detail 
   if (def.max_pointers < hands) {
     def.max_pointers = hands;
   }
-  hap_status status = hap_session_create(&def, &ode, &r->session, detail);
+  hap_status status = r->is_loaded ? hap_scene_session(options->loaded, &def, &r->session, detail)
+                                   : hap_session_create(&def, &ode, &r->session, detail);
   if (status < HAP_OK) {
     return status;
   }
@@ -217,13 +220,47 @@ static hap_status attach_recording(const rig_options *options, rig *r, hap_detai
   return options->record != NULL ? hap_session_record(r->session, options->record, detail) : HAP_OK;
 }
 
+/* A loaded scene as if it were a built-in one. */
+static hap_status loaded_take(const rig_options *options, rig *out, hap_detail *detail)
+{
+  const hap_scene *from = options->loaded;
+  if (options->island_threads > 1) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT, "a scene from a file has no island threads");
+  }
+  out->scene = calloc(1, sizeof *out->scene);
+  dBodyID *bodies = calloc(from->body_count + 1, sizeof(dBodyID));
+  if (out->scene == NULL || bodies == NULL) {
+    free(out->scene);
+    free(bodies);
+    out->scene = NULL;
+    return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a scene");
+  }
+  for (uint32_t i = 0; i < from->body_count; ++i) {
+    bodies[i] = from->bodies[i].body;
+  }
+  *out->scene = (scene){.parameters = *options->parameters,
+                        .world = from->world,
+                        .space = from->space,
+                        .bodies = bodies,
+                        .body_count = from->body_count};
+  out->is_loaded = true;
+  return HAP_OK;
+}
+
+static hap_status scene_make(const rig_options *options, rig *out, hap_detail *detail)
+{
+  if (options->loaded != NULL) {
+    return loaded_take(options, out, detail);
+  }
+  return options->parameters != NULL
+             ? scene_create_from(options->parameters, options->count, &out->scene, detail)
+             : scene_create(options->scene, &out->scene, detail);
+}
+
 hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
 {
   memset(out, 0, sizeof *out);
-  hap_status status =
-      options->parameters != NULL
-          ? scene_create_from(options->parameters, options->count, &out->scene, detail)
-          : scene_create(options->scene, &out->scene, detail);
+  hap_status status = scene_make(options, out, detail);
   out->devices[0] = options->hardware;
   if (status < HAP_OK) {
     rig_destroy(out);
@@ -257,6 +294,11 @@ void rig_destroy(rig *r)
     hap_device_close(r->devices[i]);
     hap_device_close(r->inner[i]);
   }
-  scene_destroy(r->scene);
+  if (r->is_loaded) {
+    free(r->scene->bodies);
+    free(r->scene);
+  } else {
+    scene_destroy(r->scene);
+  }
   memset(r, 0, sizeof *r);
 }

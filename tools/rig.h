@@ -23,6 +23,9 @@ typedef struct rig_around {
 typedef struct rig_options {
   const char *scene;                  /* "name" or "name:N" */
   const scene_parameters *parameters; /* not NULL: build from these with count, not from scene */
+  /* Not NULL: this one, borrowed, with hands and pointers as in parameters. It has no threads for
+   * islands */
+  hap_scene *loaded;
   int count;
   /* Specs in pointer order; "virtual" alone: the scene's own simulated hand; none given: the same.
    * Further end effectors of a device take what the scene has more of hands than there are devices,
@@ -61,6 +64,7 @@ typedef enum rig_part {
 
 typedef struct rig {
   scene *scene;
+  bool is_loaded; /* world and space of scene are those of rig_options.loaded */
   hap_session *session;
   hap_device *devices[RIG_POINTERS_MAX]; /* device_count */
   hap_device *inner[RIG_POINTERS_MAX];   /* what the devices are around; NULL: nothing */

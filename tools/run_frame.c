@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/vec.h"
+#include "scene/scene_internal.h"
 #include "tools/run_summary.h"
 
 bool run_frame_reserve(view_frame *out, size_t bodies)
@@ -35,14 +37,16 @@ void run_frame_copy(const view_frame *from, view_frame *to)
   to->roles = roles;
 }
 
-void run_frame_pointers(const hap_scene *from, view_frame *io)
+void run_frame_pointers(const run_options *options, const hap_scene *from, view_frame *io)
 {
+  const scene_parameters *given = options->rig.parameters;
   for (size_t i = 0; i < VIEW_POINTERS_MAX; ++i) {
     view_pointer *p = &io->pointers[i];
     hap_pointer_def def;
     const char *spec;
     hap_pointer_def_init(&def, sizeof def);
-    if (hap_scene_hand(from, (uint32_t)i, &def, &spec) < HAP_OK) {
+    def.radius = given != NULL ? given->radius : def.radius;
+    if (given == NULL && hap_scene_hand(from, (uint32_t)i, &def, &spec) < HAP_OK) {
       (void)hap_scene_hand(from, 0, &def, &spec);
     }
     p->radius = def.radius;
@@ -106,14 +110,27 @@ static void touches_read(hap_session *session, hap_pointer_id id, view_frame *io
   }
 }
 
+/* The frame of a body of a scene may be beside its centre of mass. */
+static void bodies_read(const run_frame_source *from, view_frame *io)
+{
+  const rig *r = from->rig;
+  (void)hap_session_poses_now(r->session, r->scene->bodies, io->body_count, io->bodies);
+  (void)hap_session_roles(r->session, r->scene->bodies, io->body_count, io->roles);
+  for (size_t i = 0; i < io->body_count && i < from->scene->body_count; ++i) {
+    double off[3];
+    hap_pose *pose = &io->bodies[i];
+    hapi_quat_rotate(pose->quat_wxyz, from->scene->bodies[i].centre, off);
+    hapi_v3_sub(pose->position, off, pose->position);
+  }
+}
+
 void run_frame_read(const run_frame_source *from, double t, view_frame *io)
 {
   const rig *r = from->rig;
   hap_stats stats;
   io->t = t;
   io->touch_count = 0;
-  (void)hap_session_poses_now(r->session, r->scene->bodies, io->body_count, io->bodies);
-  (void)hap_session_roles(r->session, r->scene->bodies, io->body_count, io->roles);
+  bodies_read(from, io);
   io->pointer_count = from->pointers;
   for (size_t i = 0; i < from->pointers; ++i) {
     if (r->pointer_count > 0) {

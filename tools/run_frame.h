@@ -8,9 +8,10 @@
 #include "tools/run_options.h"
 #include "view/view.h"
 
-/* Where moments come from. The rig must outlive it. */
+/* Where moments come from. Rig and scene must outlive it. */
 typedef struct run_frame_source {
   const rig *rig;
+  const hap_scene *scene; /* that of the rig, once more */
   size_t pointers;   /* of the session, at most VIEW_POINTERS_MAX */
   hap_trace_row row; /* the newest; used where the rig knows no pointers, of a recording */
 } run_frame_source;
@@ -23,7 +24,7 @@ void run_frame_free(view_frame *of);
 void run_frame_copy(const view_frame *from, view_frame *to);
 
 /* Size and form of the pointers: what the scene's hands have; further ones are as the first. */
-void run_frame_pointers(const hap_scene *from, view_frame *io);
+void run_frame_pointers(const run_options *options, const hap_scene *from, view_frame *io);
 
 /* Fills in the moment t, s, of the run. */
 void run_frame_read(const run_frame_source *from, double t, view_frame *io);

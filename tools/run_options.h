@@ -41,6 +41,7 @@ typedef struct run_window_options {
 typedef struct run_options {
   run_action action;
   rig_options rig;
+  bool strict; /* of a file: what would be left out is refused */
   bool coupling_given;
   double seconds;     /* 0: as long as the scene says */
   double model_age_s; /* negative: not given */

@@ -15,6 +15,7 @@
 #ifdef HAPODE_VIEW
 
 #include "tools/run_frame.h"
+#include "tools/run_scene_file.h"
 
 #define FRAMES_HZ 30.0
 #define FRAMES_CALM 0.92 /* of the framing, from frame to frame */
@@ -22,6 +23,7 @@
 struct run_shot {
   const run_options *options;
   run_frame_source source;
+  hap_scene *scene;
   view *view;
   FILE *file; /* of --shot; NULL: not wanted */
   view_labels labels;
@@ -60,14 +62,12 @@ static hap_status folder_open(const char *path, hap_detail *detail)
                    strerror(why == EEXIST ? ENOTDIR : why));
 }
 
-static hap_status scene_describe(const char *spec, run_shot *shot, hap_detail *detail)
+static hap_status scene_describe(run_shot *shot, hap_detail *detail)
 {
-  hap_scene *other;
-  HAPI_TRY(hap_scene_load(spec, &other, detail)); /* one more, to be read */
-  hap_status status = view_take_scene(shot->view, other, detail);
-  run_frame_pointers(other, &shot->now);
-  (void)hap_scene_destroy(other);
-  return status;
+  HAPI_TRY(run_scene_file_again(shot->options, &shot->scene, detail)); /* to be read */
+  run_frame_pointers(shot->options, shot->scene, &shot->now);
+  shot->source.scene = shot->scene;
+  return view_take_scene(shot->view, shot->scene, detail);
 }
 
 static hap_status shot_make(run_shot *shot, double seconds, hap_detail *detail)
@@ -78,7 +78,7 @@ static hap_status shot_make(run_shot *shot, double seconds, hap_detail *detail)
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a picture");
   }
   HAPI_TRY(view_create(o->shot.size[0], o->shot.size[1], &shot->view, detail));
-  HAPI_TRY(scene_describe(o->rig.scene, shot, detail));
+  HAPI_TRY(scene_describe(shot, detail));
   if (o->shot.camera_given) {
     view_set_camera(shot->view, o->shot.camera, &o->shot.camera[3]);
   }
@@ -97,6 +97,7 @@ static hap_status shot_make(run_shot *shot, double seconds, hap_detail *detail)
 static void shot_free(run_shot *shot)
 {
   view_destroy(shot->view);
+  (void)hap_scene_destroy(shot->scene);
   run_frame_free(&shot->now);
   run_frame_free(&shot->kept);
   if (shot->file != NULL) {

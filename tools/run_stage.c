@@ -13,6 +13,7 @@
 #include "tools/run_frame.h"
 #include "tools/run_hand.h"
 #include "tools/run_history.h"
+#include "tools/run_scene_file.h"
 
 #define WISHES_MAX 32
 #define STRIP_S 8.0
@@ -156,18 +157,20 @@ hap_status run_stage_enter(run_stage *stage, const run_options *options, const r
   if (stage == NULL) {
     return HAP_OK;
   }
-  HAPI_TRY(hap_scene_load(options->rig.scene, &other, detail)); /* one more, to be read */
+  HAPI_TRY(run_scene_file_again(options, &other, detail)); /* to be read */
   stage->run = (stage_run){
       .options = options,
       .rig = r,
-      .source = {.rig = r, .pointers = pointers < VIEW_POINTERS_MAX ? pointers : VIEW_POINTERS_MAX},
+      .source = {.rig = r,
+                 .scene = other,
+                 .pointers = pointers < VIEW_POINTERS_MAX ? pointers : VIEW_POINTERS_MAX},
       .begun = wall_clock(),
       .scale = 1.0,
       .scale_kept = 1.0,
       .physics_hz = options->rig.def.physics_hz,
       .model = options->rig.def.model,
       .accuracy = options->rig.def.accuracy};
-  run_frame_pointers(other, &stage->run.frame);
+  run_frame_pointers(options, other, &stage->run.frame);
   pthread_mutex_lock(&stage->mutex);
   hap_status status = shared_enter(stage, other, seconds, detail);
   pthread_mutex_unlock(&stage->mutex);
