@@ -7,6 +7,7 @@
 #include "base/log.h"
 #include "import/build.h"
 #include "import/mjcf.h"
+#include "import/path.h"
 #include "import/xml.h"
 
 hap_status import_read(import_work *work, const char *path, import_model *out)
@@ -18,6 +19,7 @@ hap_status import_read(import_work *work, const char *path, import_model *out)
   if (name == NULL) {
     return import_no_memory(work);
   }
+  HAPI_TRY(import_folder(work, path));
   HAPI_TRY(xml_read(work, path, name, &root));
   if (!xml_is(root, "mujoco")) {
     return import_refuse(work, root->at, "<%.60s> is no <mujoco>", root->name);

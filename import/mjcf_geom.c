@@ -5,6 +5,7 @@
 
 #include "base/log.h"
 #include "base/vec.h"
+#include "import/mesh.h"
 #include "import/mjcf_internal.h"
 
 #define THINGS_MOST 20000u
@@ -31,7 +32,7 @@ static const int shapes[] = {
     [TYPE_ELLIPSOID] = IMPORT_ELLIPSOID,
     [TYPE_CYLINDER] = IMPORT_CYLINDER,
     [TYPE_BOX] = IMPORT_BOX,
-    [TYPE_MESH] = -1,
+    [TYPE_MESH] = IMPORT_MESH,
     [TYPE_SDF] = -1,
 };
 
@@ -39,6 +40,7 @@ static size_t sizes_of(int shape)
 {
   switch (shape) {
     case IMPORT_PLANE:
+    case IMPORT_MESH:
       return 0;
     case IMPORT_SPHERE:
       return 1;
@@ -97,7 +99,7 @@ static hap_status size_read(mjcf *m, const mjcf_item *item, import_geom *geom)
   return HAP_OK;
 }
 
-static hap_status mass_read(mjcf *m, const mjcf_item *item, import_geom *geom)
+static hap_status mass_read(mjcf *m, const mjcf_item *item, const mjcf_mesh *of, import_geom *geom)
 {
   double density = 1000.0;
   double mass = -1.0;
@@ -112,7 +114,12 @@ static hap_status mass_read(mjcf *m, const mjcf_item *item, import_geom *geom)
     return HAP_OK;
   }
   import_mass own;
-  import_shape_mass(geom->shape, geom->size, mass >= 0.0 ? 1.0 : density, &own);
+  if (of != NULL) {
+    own = of->mass;
+    import_mass_scale(&own, density);
+  } else {
+    import_shape_mass(geom->shape, geom->size, mass >= 0.0 ? 1.0 : density, &own);
+  }
   if (mass >= 0.0 && own.mass > 0.0) {
     import_mass_scale(&own, mass / own.mass);
   }
@@ -174,17 +181,34 @@ static import_geom *geom_add(mjcf *m, import_body *body)
   return *end;
 }
 
+/* The mesh of a geom that has one; *out_why not NULL: the geom is left out. */
+static hap_status surface_read(mjcf *m, const mjcf_item *item, int shape, const mjcf_mesh **out,
+                               const char **out_why)
+{
+  *out = NULL;
+  *out_why = NULL;
+  if (shape < 0) {
+    *out_why = "of no such shape";
+  } else if (shape == IMPORT_MESH) {
+    HAPI_TRY(mjcf_find_mesh(m, item, out));
+    *out_why = (*out)->hull == NULL ? "its mesh is" : NULL;
+  } else if (mjcf_get(m, item, "mesh") != NULL) {
+    *out_why = "its size is that of a mesh";
+  }
+  return HAP_OK;
+}
+
 hap_status mjcf_read_geom(mjcf *m, const mjcf_item *item, const hap_pose *frame, import_body *body)
 {
   int type = TYPE_SPHERE;
   const char *name = xml_get(item->element, "name");
   HAPI_TRY(mjcf_word(m, item, "type", TYPES, &type));
-  if (shapes[type] < 0 || mjcf_get(m, item, "mesh") != NULL) {
+  const mjcf_mesh *mesh;
+  const char *why;
+  HAPI_TRY(surface_read(m, item, shapes[type], &mesh, &why));
+  if (why != NULL) {
     import_note(m->work, item->element->at, "geom %.60s left out, and its mass: %s",
-                name != NULL ? name : "without a name",
-                type == TYPE_HFIELD ? "a height field"
-                : type == TYPE_SDF  ? "a distance field"
-                                    : "a mesh");
+                name != NULL ? name : "without a name", why);
     return HAP_OK;
   }
   if (++m->things > THINGS_MOST) {
@@ -199,7 +223,10 @@ hap_status mjcf_read_geom(mjcf *m, const mjcf_item *item, const hap_pose *frame,
   geom->shape = (import_shape)shapes[type];
   HAPI_TRY(size_read(m, item, geom));
   import_pose_join(frame, &geom->pose, &geom->pose);
-  HAPI_TRY(mass_read(m, item, geom));
+  geom->mesh = mesh != NULL                      ? mesh->hull
+               : geom->shape == IMPORT_ELLIPSOID ? import_ellipsoid(m->work, geom->size, &why)
+                                                 : NULL;
+  HAPI_TRY(mass_read(m, item, mesh, geom));
   HAPI_TRY(colour_read(m, item, geom));
   return contact_read(m, item, geom);
 }

@@ -41,6 +41,14 @@ typedef struct mjcf_compiler {
   const char *mesh_folder;
 } mjcf_compiler;
 
+/* Of <asset>, in the frame of its file. */
+typedef struct mjcf_mesh {
+  const xml_element *element;
+  const import_mesh *hull; /* NULL: it was left out */
+  import_mass mass;        /* of density 1 */
+  struct mjcf_mesh *next;
+} mjcf_mesh;
+
 typedef struct mjcf {
   import_work *work;
   import_model *model;
@@ -48,6 +56,7 @@ typedef struct mjcf {
   mjcf_compiler compiler;
   mjcf_class *classes; /* the first is main */
   mjcf_section *sections;
+  mjcf_mesh *meshes;
   import_body *last_body;
   size_t bodies;
   size_t things; /* geoms and joints */
@@ -85,6 +94,11 @@ HAP_NODISCARD hap_status mjcf_pose(mjcf *m, const mjcf_item *item, hap_pose *out
 /* Turns z into the direction on the shortest way. */
 void mjcf_turn_z(const double direction[3], double out_quat[4]);
 void mjcf_turn_euler(const mjcf *m, const double angles[3], double out_quat[4]);
+
+/* ---- mjcf_mesh.c ---- */
+
+/* The mesh that a geom names; refused where there is none. */
+HAP_NODISCARD hap_status mjcf_find_mesh(mjcf *m, const mjcf_item *geom, const mjcf_mesh **out);
 
 /* ---- mjcf_geom.c, mjcf_joint.c, mjcf_body.c ---- */
 

@@ -27,6 +27,8 @@ static const mjcf_known elements[] = {
     {"joint", "name class type pos axis limited range ref armature frictionloss",
      "group user solreffriction solimpfriction solreflimit solimplimit margin "
      "actuatorfrcrange actuatorfrclimited actuatorgravcomp"},
+    {"mesh", "name class file vertex face scale refpos refquat",
+     "normal texcoord smoothnormal maxhullvert content_type material"},
     {"freejoint", "name", "group align"},
     {"compiler",
      "angle eulerseq autolimits inertiafromgeom inertiagrouprange boundmass boundinertia "

@@ -22,6 +22,7 @@ typedef struct import_chunk import_chunk;
 
 typedef struct import_work {
   import_chunk *chunks;
+  const char *folder;                         /* of the file, without links */
   bool strict;                                /* what would be left out is refused */
   void (*said)(void *user, const char *line); /* may be NULL */
   void *user;
