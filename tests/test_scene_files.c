@@ -363,6 +363,96 @@ TEST(a_mesh_has_the_mass_of_its_volume)
   import_work_finish(&work);
 }
 
+static const double corners[4][3] = {{0, 0, 0}, {0.1, 0, 0}, {0, 0.2, 0}, {0, 0, 0.3}};
+static const int faces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+
+static size_t floats_put(unsigned char *to, const double *from, size_t count)
+{
+  for (size_t i = 0; i < count; ++i) {
+    float value = (float)from[i];
+    memcpy(to + 4 * i, &value, sizeof value);
+  }
+  return 4 * count;
+}
+
+/* The same tetrahedron in all forms. */
+static void mesh_files_write(void)
+{
+  char text[4000];
+  size_t used = 0;
+  unsigned char bytes[400] = {0};
+  const int counts[4] = {4, 0, 0, 4};
+  for (int i = 0; i < 4; ++i) {
+    used += (size_t)snprintf(text + used, sizeof text - used, "v %g %g %g\n", corners[i][0],
+                             corners[i][1], corners[i][2]);
+  }
+  (void)snprintf(text + used, sizeof text - used,
+                 "f 1/1/1 3/2/2 2/3/3\nf 1 2 4\nf -4 -1 -2\n# no face\nf 2//1 3//1 4//1\n");
+  file_write(folder_path("a.obj"), text);
+  used = (size_t)snprintf(text, sizeof text, "solid a\n");
+  bytes[80] = 4;
+  for (size_t i = 0; i < 4; ++i) {
+    used += (size_t)snprintf(text + used, sizeof text - used, "facet normal 0 0 0\nouter loop\n");
+    for (size_t k = 0; k < 3; ++k) {
+      const double *v = corners[faces[i][k]];
+      used += (size_t)snprintf(text + used, sizeof text - used, "  vertex %g %g %g\n", v[0], v[1],
+                               v[2]);
+      (void)floats_put(bytes + 84 + 50 * i + 12 + 12 * k, v, 3);
+    }
+    used += (size_t)snprintf(text + used, sizeof text - used, "endloop\nendfacet\n");
+  }
+  file_write(folder_path("text.stl"), text);
+  file_write_bytes(folder_path("a.STL"), bytes, 84 + 200);
+  file_write_bytes(folder_path("short.stl"), bytes, 84 + 199);
+  memcpy(bytes, counts, sizeof counts);
+  used = 16 + floats_put(bytes + 16, &corners[0][0], 12);
+  memcpy(bytes + used, faces, sizeof faces);
+  file_write_bytes(folder_path("a.msh"), bytes, used + sizeof faces);
+  bytes[used] = 4;
+  file_write_bytes(folder_path("bad.msh"), bytes, used + sizeof faces);
+}
+
+static const struct {
+  const char *file;
+  const char *note; /* NULL: it is read */
+} mesh_files[] = {
+    {"a.obj", NULL},
+    {"text.stl", NULL},
+    {"a.STL", NULL},
+    {"a.msh", NULL},
+    {"short.stl", "mesh short.stl left out: no such mesh can be"},
+    {"bad.msh", "mesh bad.msh left out: no such mesh can be"},
+    {"none.stl", "mesh none.stl left out: it is not there"},
+    {"a.dae", "mesh a.dae left out: it is not there"},
+    {"scene.xml", "mesh scene.xml left out: neither STL, OBJ nor MSH"},
+    {"../../etc/passwd", "left out: it leads out of the folder"},
+    {"/etc/passwd", "left out: it leads out of the folder"},
+};
+
+TEST(meshes_are_read_from_files_of_the_folder)
+{
+  mesh_files_write();
+  for (size_t i = 0; i < sizeof mesh_files / sizeof mesh_files[0]; ++i) {
+    char text[1000];
+    noted notes = {.length = 0};
+    import_work work = {.said = note_take, .user = &notes};
+    snprintf(text, sizeof text,
+             "<mujoco><asset><mesh name='a' file='%s'/></asset><worldbody><body><freejoint/>"
+             "<geom size='.1' mass='1'/><geom type='mesh' mesh='a'/></body></worldbody></mujoco>",
+             mesh_files[i].file);
+    import_model model = file_read(&work, text);
+    const double mass = model.bodies->next->mass.mass - 1.0;
+    if (mesh_files[i].note == NULL) {
+      CHECK_NEAR(mass, 1.0, 1e-6);
+      CHECK_SAY(notes.length == 0, "%s", notes.lines);
+    } else {
+      CHECK_NEAR(mass, 0.0, 1e-12);
+      CHECK_SAY(strstr(notes.lines, mesh_files[i].note) != NULL, "%s", notes.lines);
+    }
+    import_work_finish(&work);
+  }
+}
+
 /* ---- the scene that comes of it ---- */
 
 static hap_scene *scene_of(const char *text)
