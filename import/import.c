@@ -8,6 +8,7 @@
 #include "import/build.h"
 #include "import/mjcf.h"
 #include "import/path.h"
+#include "import/urdf.h"
 #include "import/xml.h"
 
 hap_status import_read(import_work *work, const char *path, import_model *out)
@@ -21,10 +22,10 @@ hap_status import_read(import_work *work, const char *path, import_model *out)
   }
   HAPI_TRY(import_folder(work, path));
   HAPI_TRY(xml_read(work, path, name, &root));
-  if (!xml_is(root, "mujoco")) {
-    return import_refuse(work, root->at, "<%.60s> is no <mujoco>", root->name);
+  if (!xml_is(root, "mujoco") && !xml_is(root, "robot")) {
+    return import_refuse(work, root->at, "<%.60s> is neither <mujoco> nor <robot>", root->name);
   }
-  HAPI_TRY(mjcf_read(work, root, out));
+  HAPI_TRY(xml_is(root, "robot") ? urdf_read(work, root, out) : mjcf_read(work, root, out));
   import_model_join(out);
   return work->failed;
 }

@@ -13,4 +13,8 @@ HAP_NODISCARD hap_status import_folder(import_work *work, const char *path);
 const char *import_path(import_work *work, const char *prefix, const char *name,
                         const char **out_why);
 
+/* The same of a name as URDF has it: "package://NAME/..." is in the nearest folder NAME that the
+ * file is in, or beside it, and may not lead out of that; "file://" is taken away. */
+const char *import_package_path(import_work *work, const char *name, const char **out_why);
+
 #endif

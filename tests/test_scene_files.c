@@ -302,6 +302,89 @@ TEST_EACH(mjcf_cases, const file_case *row)
   import_work_finish(&work);
 }
 
+#define URDF(text) \
+  "<robot name='r'>\n<mujoco><compiler fusestatic='false'/></mujoco>\n" text "</robot>"
+#define BALL "<collision><geometry><sphere radius='.1'/></geometry></collision>"
+
+static const file_case urdf_cases[] = {
+    {"links_and_kinds_of_joints",
+     URDF("<link name='base'>" BALL "</link>"
+          "<link name='arm'>" BALL "</link><link name='hand'>" BALL "</link>"
+          "<link name='tool'>" BALL "</link><link name='lift'>" BALL "</link>"
+          "<joint name='a' type='revolute'><parent link='base'/><child link='arm'/>"
+          "<origin xyz='.1 .2 .3' rpy='.3 -.5 2'/><axis xyz='0 1 1'/>"
+          "<limit lower='-1' upper='2' effort='1' velocity='1'/></joint>"
+          "<joint name='b' type='continuous'><parent link='arm'/><child link='hand'/>"
+          "<origin xyz='0 0 .5'/></joint>"
+          "<joint name='c' type='prismatic'><parent link='base'/><child link='lift'/>"
+          "<axis xyz='0 0 2'/><limit lower='-.1' upper='.3' effort='1' velocity='1'/></joint>"
+          "<joint name='d' type='fixed'><parent link='hand'/><child link='tool'/>"
+          "<origin xyz='1 0 0' rpy='1 1 1'/></joint>")},
+    {"inertials_and_shapes",
+     URDF("<link name='base'/><link name='arm'>"
+          "<inertial><origin xyz='.1 0 .2' rpy='.1 .2 .3'/><mass value='3'/>"
+          "<inertia ixx='.3' iyy='.4' izz='.5' ixy='.01' ixz='-.02' iyz='.03'/></inertial>"
+          "</link><link name='hand'>"
+          "<collision><origin xyz='.1 0 0' rpy='.1 .2 .3'/><geometry><box size='.1 .2 .3'/>"
+          "</geometry></collision>"
+          "<collision><origin xyz='0 .3 0' rpy='1 0 0'/><geometry>"
+          "<cylinder radius='.05' length='.3'/></geometry></collision></link>"
+          "<joint name='a' type='revolute'><parent link='base'/><child link='arm'/>"
+          "<limit lower='-1' upper='2' effort='1' velocity='1'/></joint>"
+          "<joint name='b' type='continuous'><parent link='arm'/><child link='hand'/></joint>")},
+};
+
+#ifdef HAPODE_ORACLE
+
+/* By the names of links: the order is MuJoCo's own. */
+static void urdf_check(const char *path, const import_model *ours)
+{
+  char error[300] = "";
+  mjModel *theirs = mj_loadXML(path, NULL, error, sizeof error);
+  REQUIRE_SAY(theirs != NULL, "MuJoCo: %s", error);
+  mjData *data = mj_makeData(theirs);
+  int count = 1;
+  mj_kinematics(theirs, data);
+  for (const import_body *body = ours->bodies->next; body != NULL; body = body->next, ++count) {
+    int i = mj_name2id(theirs, mjOBJ_BODY, body->name);
+    REQUIRE_SAY(i > 0, "no body \"%s\"", body->name);
+    vectors_check("place", body->name, body->pose_world.position, data->xpos + 3 * i, 3);
+    turn_check("turn", body->name, body->pose_world.quat_wxyz, data->xquat + 4 * i);
+    mass_check(body, theirs, i);
+    CHECK(theirs->body_jntnum[i] == (body->joints != NULL ? 1 : 0));
+    if (body->joints != NULL) {
+      joint_check(body->joints, theirs, theirs->body_jntadr[i]);
+    }
+    int g = theirs->body_geomadr[i];
+    for (const import_geom *geom = body->geoms; geom != NULL; geom = geom->next, ++g) {
+      vectors_check("place of geom", body->name, geom->pose.position, theirs->geom_pos + 3 * g, 3);
+      turn_check("turn of geom", body->name, geom->pose.quat_wxyz, theirs->geom_quat + 4 * g);
+    }
+  }
+  CHECK(count == theirs->nbody);
+  mj_deleteData(data);
+  mj_deleteModel(theirs);
+}
+
+#else
+
+static void urdf_check(const char *path, const import_model *ours)
+{
+  oracle_check(path, ours, true); /* skips */
+}
+
+#endif
+
+TEST_EACH(urdf_cases, const file_case *row)
+{
+  noted notes = {.length = 0};
+  import_work work = {.said = note_take, .user = &notes};
+  import_model model = file_read(&work, row->text);
+  CHECK_SAY(strcmp(notes.lines, "scene.xml:2: mujoco left out\n") == 0, "%s", notes.lines);
+  urdf_check(folder_path("scene.xml"), &model);
+  import_work_finish(&work);
+}
+
 /* ---- files of others ---- */
 
 /* NULL: the test is skipped. */
@@ -328,6 +411,18 @@ TEST(a_humanoid)
   CHECK(strstr(notes.lines, "tendon left out, 2 in it\n") != NULL);
   oracle_check(path, &model, true);
   import_work_finish(&work);
+}
+
+TEST(a_robot_of_one_empty_link)
+{
+  const char *path = other_file("model.urdf");
+  hap_scene *scene = NULL;
+  hap_detail why = {""};
+  hap_scene_counts counts;
+  const import_options options = {.strict = true};
+  REQUIRE_SAY(import_scene(path, &options, &scene, NULL, &why) == HAP_OK, "%s", why.text);
+  CHECK(hap_scene_count(scene, &counts, sizeof counts) == HAP_OK && counts.bodies == 0);
+  CHECK(hap_scene_destroy(scene) == HAP_OK);
 }
 
 TEST(a_car)
@@ -613,6 +708,17 @@ static const struct {
     {IN_WORLD("<body><joint range='1 0'/><geom size='.1'/></body>"), "scene.xml:3: range"},
     {"<mujoco>\n<contact><exclude body1='a' body2='b'/></contact></mujoco>",
      "scene.xml:2: body1: there is no body a"},
+    {URDF("<link name='a'/><joint type='fixed'><parent link='a'/><child link='b'/></joint>"),
+     "scene.xml:3: child: there is no link b"},
+    {URDF("<link name='a'/><link name='b'/><joint type='fixed'><parent link='a'/><child link='b'/>"
+          "</joint>\n<joint type='fixed'><parent link='b'/><child link='a'/></joint>"),
+     "scene.xml:1: links in a loop"},
+    {URDF("<link name='a'/><link name='b'/><joint type='fixed'><parent link='a'/><child link='b'/>"
+          "</joint>\n<joint type='fixed'><parent link='a'/><child link='b'/></joint>"),
+     "scene.xml:4: child: link b has a parent"},
+    {URDF("<link name='a'/><link name='b'/><joint type='odd'><parent link='a'/><child link='b'/>"
+          "</joint>"),
+     "scene.xml:3: type: no joint is \"odd\""},
     {"<mujoco><compiler eulerseq='xyq'/></mujoco>", "scene.xml:1: eulerseq"},
     {"<mujoco><compiler coordinate='global'/></mujoco>", "scene.xml:1: coordinate"},
 };

@@ -266,7 +266,7 @@ static hap_status take_constant(run_options *options, const option *self, const 
 static const option table[] = {
     {"--scene", "NAME[:N]",
      "scene, N: how many bodies where it takes that (default row10); or a file,\n"
-     "MJCF: what is left out of it comes line by line on stderr",
+     "MJCF or URDF: what is left out of it comes line by line on stderr",
      take_text, offsetof(run_options, rig.scene), 0, 0},
     {"--strict", NULL, "a file of which anything would be left out is refused", take_flag,
      offsetof(run_options, strict), 0, 0},

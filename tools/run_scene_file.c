@@ -21,7 +21,8 @@ static bool scene_is_file(const char *spec)
 {
   const char *dot = strrchr(spec, '.');
   return strchr(spec, '/') != NULL ||
-         (dot != NULL && (strcmp(dot, ".xml") == 0 || strcmp(dot, ".mjcf") == 0));
+         (dot != NULL &&
+          (strcmp(dot, ".xml") == 0 || strcmp(dot, ".mjcf") == 0 || strcmp(dot, ".urdf") == 0));
 }
 
 #ifdef HAPODE_IMPORT
