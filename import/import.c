@@ -26,6 +26,9 @@ hap_status import_read(import_work *work, const char *path, import_model *out)
     return import_refuse(work, root->at, "<%.60s> is neither <mujoco> nor <robot>", root->name);
   }
   HAPI_TRY(xml_is(root, "robot") ? urdf_read(work, root, out) : mjcf_read(work, root, out));
+  if (work->starved) {
+    return import_no_memory(work);
+  }
   import_model_join(out);
   return work->failed;
 }

@@ -3,8 +3,8 @@
 #ifndef HAPODE_IMPORT_IMPORT_H
 #define HAPODE_IMPORT_IMPORT_H
 
-/* Scenes from files of others: MJCF and URDF (docs/scene_files.md). What cannot be had of a file is told
- * line by line, and the rest is loaded. */
+/* Scenes from files of others: MJCF and URDF (docs/scene_files.md). What cannot be had of a file is
+ * told line by line, and the rest is loaded. */
 
 #include <hapode/scene.h>
 

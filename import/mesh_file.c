@@ -247,6 +247,7 @@ import_mesh *import_mesh_file(import_work *work, const char *path, const char **
   if (size >= 0 && size <= (long)BYTES_MOST && fseek(file, 0, SEEK_SET) == 0) {
     unsigned char *bytes = hapi_alloc((size_t)size + 1);
     r.why = bytes == NULL ? no_memory : NULL;
+    work->starved = work->starved || bytes == NULL;
     if (bytes != NULL && fread(bytes, 1, (size_t)size, file) == (size_t)size) {
       bytes_read(&r, end != NULL ? end : "", bytes, (size_t)size);
     }

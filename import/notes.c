@@ -42,6 +42,7 @@ void *import_take(import_work *work, size_t size)
     chunk = chunk_new(work, size);
   }
   if (chunk == NULL) {
+    work->starved = true;
     return NULL;
   }
   void *memory = (char *)chunk->bytes + chunk->used;

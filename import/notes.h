@@ -27,6 +27,7 @@ typedef struct import_work {
   void (*said)(void *user, const char *line); /* may be NULL */
   void *user;
   size_t note_count;
+  bool starved;       /* memory was refused: no answer but HAP_ERROR_MEMORY is right */
   hap_status failed;  /* HAP_ERROR_ARGUMENT of a strict note; the reader goes on to its end */
   hap_detail *detail; /* may be NULL */
 } import_work;

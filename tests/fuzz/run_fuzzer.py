@@ -17,6 +17,7 @@ import tempfile
 
 INPUT_MAX = 600  # bytes; small inputs reach as much and go faster
 INPUT_MAX_OF = {
+    "scene_file": 2000,  # a robot of two bodies has 900
     "recording": 1200,  # what it was made with takes 350 of them
     "spidar_model": 2500,  # a whole file of eight strings has 2000
 }
