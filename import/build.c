@@ -260,6 +260,32 @@ static hap_status passes_add(import_work *work, const import_model *model, hap_s
   return HAP_OK;
 }
 
+/* The first end of a joint is a body that moves. */
+static hap_status holds_add(import_work *work, const import_model *model, hap_scene *scene)
+{
+  for (const import_hold *hold = model->holds; hold != NULL; hold = hold->next) {
+    hap_joint_def def;
+    hap_detail why = {""};
+    const import_body *a = hold->a->carrier;
+    const import_body *b = hold->b->carrier;
+    if (a == b) {
+      import_note(work, hold->at, "equality between parts of one body left out");
+      continue;
+    }
+    hap_joint_def_init(&def, sizeof def);
+    def.kind = hold->is_fixed ? HAP_JOINT_FIXED : HAP_JOINT_BALL;
+    def.body_a = a->parent != NULL ? a->number : b->number;
+    def.body_b = a->parent != NULL && b->parent != NULL ? b->number : HAP_SCENE_WORLD;
+    const hap_pose *frame = &hold->a->pose_world;
+    hapi_pose_point(frame->position, frame->quat_wxyz, hold->anchor, def.anchor);
+    hap_status status = hap_scene_add_joint(scene, &def, NULL, &why);
+    if (status < HAP_OK) {
+      return build_fail(work, hold->at, status, &why);
+    }
+  }
+  return HAP_OK;
+}
+
 hap_status import_build(import_work *work, import_model *model, hap_scene *scene)
 {
   for (import_body *body = model->bodies; body != NULL; body = body->next) {
@@ -269,5 +295,6 @@ hap_status import_build(import_work *work, import_model *model, hap_scene *scene
       HAPI_TRY(carrier_add(work, model, body, scene));
     }
   }
-  return passes_add(work, model, scene);
+  HAPI_TRY(passes_add(work, model, scene));
+  return holds_add(work, model, scene);
 }

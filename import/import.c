@@ -6,6 +6,7 @@
 
 #include "base/log.h"
 #include "import/build.h"
+#include "import/include.h"
 #include "import/mjcf.h"
 #include "import/path.h"
 #include "import/urdf.h"
@@ -24,6 +25,9 @@ hap_status import_read(import_work *work, const char *path, import_model *out)
   HAPI_TRY(xml_read(work, path, name, &root));
   if (!xml_is(root, "mujoco") && !xml_is(root, "robot")) {
     return import_refuse(work, root->at, "<%.60s> is neither <mujoco> nor <robot>", root->name);
+  }
+  if (xml_is(root, "mujoco")) {
+    HAPI_TRY(xml_include(work, root));
   }
   HAPI_TRY(xml_is(root, "robot") ? urdf_read(work, root, out) : mjcf_read(work, root, out));
   if (work->starved) {

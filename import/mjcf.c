@@ -95,6 +95,48 @@ static hap_status contact_read(mjcf *m, const xml_element *contact)
   return HAP_OK;
 }
 
+/* connect and weld between bodies; all else is noted. */
+static hap_status hold_read(mjcf *m, const xml_element *element, import_hold *hold)
+{
+  const mjcf_item item = {element, m->classes};
+  const char *names[2] = {xml_get(element, "body1"), xml_get(element, "body2")};
+  const import_body *bodies[2] = {NULL, m->model->bodies};
+  size_t count;
+  for (int i = 0; i < 2; ++i) {
+    bodies[i] = names[i] != NULL ? import_find_body(m->model, names[i]) : bodies[i];
+    if (bodies[i] == NULL) {
+      return import_refuse(m->work, element->at, "body%d: there is no body %.60s", i + 1,
+                           names[i] != NULL ? names[i] : "without a name");
+    }
+  }
+  HAPI_TRY(mjcf_numbers(m, &item, "anchor", XML_OF(3, 3), hold->anchor, &count));
+  hold->at = element->at;
+  hold->a = bodies[0];
+  hold->b = bodies[1];
+  hold->is_fixed = xml_is(element, "weld");
+  return HAP_OK;
+}
+
+static hap_status equality_read(mjcf *m, const xml_element *equality)
+{
+  for (const xml_element *child = equality->children; child != NULL; child = child->next) {
+    const char *active = xml_get(child, "active");
+    if (!(xml_is(child, "connect") || xml_is(child, "weld")) || xml_get(child, "site1") != NULL ||
+        xml_get(child, "relpose") != NULL || (active != NULL && strcmp(active, "false") == 0)) {
+      import_note(m->work, child->at, "equality: %.40s left out", child->name);
+      continue;
+    }
+    import_hold *hold = import_take(m->work, sizeof *hold);
+    if (hold == NULL) {
+      return import_no_memory(m->work);
+    }
+    HAPI_TRY(hold_read(m, child, hold));
+    hold->next = m->model->holds;
+    m->model->holds = hold;
+  }
+  return HAP_OK;
+}
+
 static hap_status sections_read(mjcf *m, const char *name,
                                 hap_status (*read)(mjcf *m, const xml_element *section))
 {
@@ -141,5 +183,6 @@ hap_status mjcf_read(import_work *work, const xml_element *root, import_model *o
   HAPI_TRY(mjcf_read_defaults(&m));
   HAPI_TRY(sections_read(&m, "worldbody", mjcf_read_worldbody));
   HAPI_TRY(sections_read(&m, "contact", contact_read));
+  HAPI_TRY(sections_read(&m, "equality", equality_read));
   return mjcf_settle(&m);
 }

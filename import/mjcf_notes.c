@@ -50,7 +50,7 @@ static const char harmless[] =
 static const char refused[] = "flex flexcomp composite plugin skin deformable";
 /* Their own readers look at them. */
 static const char groups[] =
-    "mujoco mujocoinclude worldbody default asset contact extension include";
+    "mujoco mujocoinclude worldbody default asset contact equality extension";
 
 static const mjcf_known *known_of(const xml_element *element)
 {
@@ -107,8 +107,8 @@ static hap_status element_note(mjcf *m, const xml_element *element, bool is_defa
     }
     return HAP_OK;
   }
-  if (xml_word_in(element->name, harmless)) {
-    return HAP_OK;
+  if (xml_word_in(element->name, harmless) || xml_is(element, "equality")) {
+    return HAP_OK; /* the reader of equality tells its own */
   }
   const bool inside = is_default || xml_is(element, "default");
   for (const xml_element *child = element->children; child != NULL; child = child->next) {

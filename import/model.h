@@ -96,11 +96,22 @@ typedef struct import_pass {
   struct import_pass *next;
 } import_pass;
 
+/* Two bodies that hold each other: at a point, or as they are. */
+typedef struct import_hold {
+  import_place at;
+  const import_body *a;
+  const import_body *b;
+  bool is_fixed;
+  double anchor[3]; /* in a's frame */
+  struct import_hold *next;
+} import_hold;
+
 typedef struct import_model {
   const char *name;
   double gravity[3];
   import_body *bodies; /* the first is the world */
   import_pass *passes;
+  import_hold *holds;
 } import_model;
 
 /* NULL: there is none. */

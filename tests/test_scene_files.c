@@ -591,6 +591,72 @@ static hap_session *session_over(hap_scene *scene)
   return session;
 }
 
+/* Two balls on strings of no length: one on the world, one rigid on it. */
+TEST(bodies_hold_each_other)
+{
+  hap_scene *scene = scene_of(
+      "<mujoco>\n<worldbody><body name='a' pos='0 0 1'><freejoint/><geom size='.1'/></body>"
+      "<body name='b' pos='.3 0 1'><freejoint/><geom size='.1'/></body></worldbody>\n<equality>"
+      "<connect body1='a' anchor='0 0 .2'/><weld body1='a' body2='b'/></equality></mujoco>");
+  hap_scene_joint joint;
+  hap_scene_body bodies[2];
+  hap_session *session = session_over(scene);
+  bool has_ball = false;
+  for (uint32_t i = 0; i < 2; ++i) {
+    REQUIRE(hap_scene_get_joint(scene, i, &joint, sizeof joint) == HAP_OK);
+    if (joint.kind == HAP_JOINT_BALL) {
+      has_ball = true;
+      CHECK(joint.body_b == HAP_SCENE_WORLD);
+      CHECK_NEAR(joint.anchor[2], 1.2, 1e-9);
+    } else {
+      CHECK(joint.kind == HAP_JOINT_FIXED && joint.body_b != HAP_SCENE_WORLD);
+    }
+  }
+  CHECK(has_ball);
+  REQUIRE(hap_session_start(session) == HAP_OK);
+  CHECK(hap_session_advance(session, 500) >= HAP_OK);
+  double d[3];
+  for (uint32_t i = 0; i < 2; ++i) {
+    REQUIRE(hap_scene_get_body(scene, i, &bodies[i], sizeof bodies[i]) == HAP_OK);
+  }
+  hapi_v3_sub(bodies[0].pose.position, bodies[1].pose.position, d);
+  CHECK_NEAR(hapi_v3_norm(d), 0.3, 0.01);
+  CHECK_NEAR(hapi_v3_norm((const double[3]){bodies[0].pose.position[0], bodies[0].pose.position[1],
+                                            bodies[0].pose.position[2] - 1.2}),
+             0.2, 0.01);
+  hap_session_destroy(session);
+  CHECK(hap_scene_destroy(scene) == HAP_OK);
+}
+
+TEST(files_are_included)
+{
+  noted notes = {.length = 0};
+  hap_detail why = {""};
+  import_work work = {.said = note_take, .user = &notes};
+  file_write(folder_path("part.xml"),
+             "<mujocoinclude>\n<body name='p'><joint damping='1'/>"
+             "<include file='geom.xml'/></body></mujocoinclude>");
+  file_write(folder_path("geom.xml"), "<x><geom size='.1'/><geom size='.2'/></x>");
+  file_write(folder_path("head.xml"), "<mujoco><default><geom density='10'/></default></mujoco>");
+  import_model model =
+      file_read(&work,
+                "<mujoco><include file='head.xml'/><worldbody><body name='a'><joint/>"
+                "<geom size='.1'/><include file='part.xml'/><geom size='.3'/></body></worldbody>"
+                "</mujoco>");
+  CHECK_SAY(strcmp(notes.lines, "part.xml:2: joint: damping left out\n") == 0, "%s", notes.lines);
+  work.said = NULL;
+  oracle_check(folder_path("scene.xml"), &model, true);
+  import_work_finish(&work);
+  file_write(folder_path("head.xml"), "<mujoco>\n<include file='head.xml'/></mujoco>");
+  hap_scene *scene = NULL;
+  CHECK(import_scene(folder_path("head.xml"), NULL, &scene, NULL, &why) == HAP_ERROR_FORMAT);
+  CHECK_SAY(strncmp(why.text, "head.xml:2: include: more than 64", 33) == 0, "%s", why.text);
+  file_write(folder_path("out.xml"), "<mujoco>\n<include file='../../etc/passwd'/></mujoco>");
+  CHECK(import_scene(folder_path("out.xml"), NULL, &scene, NULL, &why) == HAP_ERROR_FORMAT);
+  CHECK_SAY(strstr(why.text, "out.xml:2: include ../../etc/passwd: it leads out") != NULL, "%s",
+            why.text);
+}
+
 /* A joint falls to its stop: which end it is hangs on the signs of range and axis. */
 typedef struct stop_case {
   const char *name;
