@@ -89,7 +89,7 @@ static void shadow_make(gpu_surfaces *out)
 {
   glGenTextures(1, &out->shadow_map);
   glBindTexture(GL_TEXTURE_2D, out->shadow_map);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT24, GPU_SHADOW_PIXELS, GPU_SHADOW_PIXELS, 0,
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT24, out->shadow_pixels, out->shadow_pixels, 0,
                GL_DEPTH_COMPONENT, GL_UNSIGNED_INT, NULL);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
@@ -118,6 +118,7 @@ hap_status gpu_surfaces_make(int width, int height, gpu_surfaces *out, hap_detai
 {
   const int many[3] = {width, height, SAMPLES};
   const int one[3] = {width, height, 0};
+  out->shadow_pixels = width > GPU_SHADOW_SMALL ? GPU_SHADOW_LARGE : GPU_SHADOW_SMALL;
   shadow_make(out);
   bool good = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
   glGenRenderbuffers(3, out->buffers);

@@ -11,7 +11,8 @@
 
 #include "view/shapes.h"
 
-#define GPU_SHADOW_PIXELS 2048
+#define GPU_SHADOW_SMALL 1024 /* of the sun's map */
+#define GPU_SHADOW_LARGE 2048 /* where the picture has more pixels than that */
 
 /* The context by EGL; current to the calling thread. */
 typedef struct gpu_context {
@@ -28,6 +29,7 @@ typedef struct gpu_surfaces {
   GLuint one;  /* framebuffer that is read */
   GLuint shadow;
   GLuint shadow_map;
+  int shadow_pixels;
   GLuint buffers[3];
 } gpu_surfaces;
 

@@ -16,6 +16,8 @@ static bool rows_write(png_structp png, png_infop info, const uint8_t *pixels, c
   }
   png_set_IHDR(png, info, (png_uint_32)size[0], (png_uint_32)size[1], 8, PNG_COLOR_TYPE_RGB,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_compression_level(png, 1); /* pictures come many a second: size matters less than time */
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
   png_write_info(png, info);
   for (int i = 0; i < size[1]; ++i) {
     png_write_row(png, pixels + 3 * (size_t)size[0] * (size_t)i);

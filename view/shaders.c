@@ -30,7 +30,7 @@
   "vec3 sky(vec3 d) {\n"                                                               \
   "  float h = clamp(d.z, -1.0, 1.0);\n"                                               \
   "  vec3 horizon = vec3(0.80, 0.84, 0.88);\n"                                         \
-  "  vec3 up = mix(horizon, vec3(0.20, 0.34, 0.56), pow(max(h, 0.0), 0.55));\n"        \
+  "  vec3 up = mix(horizon, vec3(0.20, 0.34, 0.56), sqrt(max(h, 0.0)));\n"             \
   "  return mix(up, vec3(0.62, 0.60, 0.57), smoothstep(0.0, 0.25, -h));\n"             \
   "}\n"                                                                                \
   "vec3 backdrop(vec3 d) {\n"                                                          \
@@ -41,15 +41,19 @@
   "  vec4 c = sun_map * vec4(p + n * texel * 1.5, 1.0);\n"                             \
   "  vec3 s = c.xyz * 0.5 + 0.5;\n"                                                    \
   "  if (any(lessThan(s, vec3(0.0))) || any(greaterThan(s, vec3(1.0)))) return 1.0;\n" \
-  "  float sum = 0.0;\n"                                                               \
-  "  vec2 step = 1.3 / vec2(textureSize(shadow, 0));\n"                                \
-  "  for (int i = -1; i <= 1; ++i) for (int j = -1; j <= 1; ++j)\n"                    \
-  "    sum += texture(shadow, vec3(s.xy + step * vec2(i, j), s.z - 0.0006));\n"        \
-  "  return sum / 9.0;\n"                                                              \
+  "  vec2 t = 1.0 / vec2(textureSize(shadow, 0));\n"                                   \
+  "  vec4 o = vec4(0.9, 0.4, -0.4, 0.9) * t.xyxy;\n"                                   \
+  "  float z = s.z - 0.0006;\n"                                                        \
+  "  return 0.25 * (texture(shadow, vec3(s.xy + o.xy, z)) +\n"                         \
+  "                 texture(shadow, vec3(s.xy - o.xy, z)) +\n"                         \
+  "                 texture(shadow, vec3(s.xy + o.zw, z)) +\n"                         \
+  "                 texture(shadow, vec3(s.xy - o.zw, z)));\n"                         \
   "}\n"                                                                                \
   "vec3 shown(vec3 c) {\n"                                                             \
   "  c = c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14);\n"                    \
-  "  return pow(clamp(c, 0.0, 1.0), vec3(1.0 / 2.2));\n"                               \
+  "  vec3 a = sqrt(clamp(c, 0.0, 1.0));\n"                                             \
+  "  vec3 b = sqrt(a);\n" /* the curve of sRGB by roots, which cost less */            \
+  "  return 0.662 * a + 0.6841 * b - 0.3236 * sqrt(b) - 0.02254 * a * a;\n"            \
   "}\n"
 
 const char shader_body_vertex[] = VERSION INSTANCE
@@ -103,7 +107,8 @@ const char shader_body_pixel[] = VERSION LIGHT
     "  vec3 around = mix(vec3(0.30, 0.28, 0.26), vec3(0.50, 0.56, 0.66), up);\n"
     "  vec3 h = normalize(sun + v);\n"
     "  float power = exp2(4.0 + 6.0 * polish);\n"
-    "  float fresnel = 0.04 + 0.5 * polish * pow(1.0 - max(dot(n, v), 0.0), 5.0);\n"
+    "  float side = 1.0 - max(dot(n, v), 0.0);\n"
+    "  float fresnel = 0.04 + 0.5 * polish * side * side * side * side * side;\n"
     "  vec3 c = base * (around * (0.62 + 0.10 * s) + vec3(1.55, 1.46, 1.32) * d * 0.72);\n"
     "  c += (power + 8.0) / 30.0 * pow(max(dot(n, h), 0.0), power) * d * fresnel * 1.2;\n"
     "  c += sky(reflect(-v, n)) * fresnel * (0.25 + 0.75 * polish) * (0.5 + 0.5 * s);\n"

@@ -192,7 +192,7 @@ static bool shared_meshes_make(things *io)
     shape_mesh mesh;
     switch ((thing_mesh)i) {
       case THING_BOX:
-        good = shape_make_corners(3, &mesh);
+        good = shape_make_corners(2, &mesh);
         break;
       case THING_ROUND:
         good = shape_make_corners(12, &mesh);

@@ -247,7 +247,7 @@ static void matrix_set(GLuint program, const char *name, const view_matrix *matr
 static void shadow_draw(const view *v, const view_matrix *sun_map)
 {
   glBindFramebuffer(GL_FRAMEBUFFER, v->surfaces.shadow);
-  glViewport(0, 0, GPU_SHADOW_PIXELS, GPU_SHADOW_PIXELS);
+  glViewport(0, 0, v->surfaces.shadow_pixels, v->surfaces.shadow_pixels);
   glClear(GL_DEPTH_BUFFER_BIT);
   glUseProgram(v->programs.shadow);
   matrix_set(v->programs.shadow, "camera", sun_map);
@@ -277,15 +277,21 @@ static void sky_draw(const view *v)
   glUseProgram(v->programs.sky);
   matrix_set(v->programs.sky, "back", &v->camera.back);
   glBindVertexArray(v->nothing);
+  glDepthFunc(GL_LEQUAL);
+  glDisable(GL_CULL_FACE);
   glDepthMask(GL_FALSE);
   glDrawArrays(GL_TRIANGLE_STRIP, 0, 3);
   glDepthMask(GL_TRUE);
+  glEnable(GL_CULL_FACE);
+  glDepthFunc(GL_LESS);
 }
 
 static void world_draw(const view *v)
 {
   batches_draw(v, DRAW_SOLID, true);
   batches_draw(v, DRAW_MARKS, true);
+  sky_draw(v); /* where nothing is */
+  glUseProgram(v->programs.body);
   glEnable(GL_BLEND); /* marks behind bodies, faintly; then what one sees through */
   glDepthMask(GL_FALSE);
   glDepthFunc(GL_GREATER);
@@ -360,7 +366,7 @@ static void picture_draw(view *v, const view_frame *frame, const view_strips *st
 {
   view_matrix sun_map;
   camera_place(v, frame, strips != NULL);
-  const float texel = camera_sun(&v->camera, sun, GPU_SHADOW_PIXELS, &sun_map);
+  const float texel = camera_sun(&v->camera, sun, v->surfaces.shadow_pixels, &sun_map);
   things_place(&v->things, frame, v->camera.size);
   glEnable(GL_DEPTH_TEST);
   glEnable(GL_CULL_FACE);
@@ -368,10 +374,6 @@ static void picture_draw(view *v, const view_frame *frame, const view_strips *st
   glBindFramebuffer(GL_FRAMEBUFFER, v->surfaces.many);
   glViewport(0, 0, v->size[0], v->size[1]);
   glClear(GL_DEPTH_BUFFER_BIT);
-  glDepthFunc(GL_LEQUAL);
-  glDisable(GL_CULL_FACE);
-  sky_draw(v);
-  glEnable(GL_CULL_FACE);
   glDepthFunc(GL_LESS);
   light_set(v, &sun_map, texel);
   world_draw(v);
