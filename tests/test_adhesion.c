@@ -8,6 +8,7 @@
 
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
+#include <hapode/pointer_set.h>
 
 #include "tests/surface_world.h"
 
@@ -390,6 +391,63 @@ TEST(a_surface_that_sticks_no_more_lets_go)
     surface_change(w, NULL);
     cw_run(w, 30);
     CHECK(w->force[2] == 0.0);
+  }
+}
+
+typedef struct away_row {
+  const char *name;
+  int way;
+} away_row;
+
+static const away_row aways[] = {
+    {"what_stuck_before_a_leap_away_and_back_does_not_stick", 0},
+    {"what_stuck_before_a_fault_does_not_stick", 1},
+    {"what_stuck_before_a_teleport_does_not_stick", 2},
+};
+
+static void hand_leave(contact_world *w, int way)
+{
+  hap_pointer_settings s;
+  hap_pointer_settings_init(&s, sizeof s);
+  double at = w->hand_at[2];
+  switch (way) {
+    case 0:
+      w->hand_at[2] = at + 0.05;
+      cw_go(w, 0.0, 0.0, 0.0, 1);
+      w->hand_at[2] = at;
+      break;
+    case 1:
+      hap_emergency_zero();
+      (void)hap_session_advance(w->session, 40);
+      CHECK(hap_session_reset_fault(w->session) == HAP_OK);
+      break;
+    default:
+      s.mask = HAP_SET_BASE | HAP_SET_TELEPORT;
+      s.pose_world_device = (hap_pose){{0.0, 0.0, 0.05}, {1.0, 0.0, 0.0, 0.0}};
+      CHECK(hap_pointer_set(w->session, w->hand, &s) == HAP_OK);
+      cw_go(w, 0.0, 0.0, 0.0, 1);
+      s.pose_world_device = (hap_pose){{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+      CHECK(hap_pointer_set(w->session, w->hand, &s) == HAP_OK);
+  }
+}
+
+/* It has not pressed since. */
+TEST_EACH(aways, const away_row *row)
+{
+  for (size_t m = 0; m < MODELS; ++m) {
+    contact_world *w = sticky_floor(all_models[m]);
+    floor_start(w);
+    hand_press(w, 0.001);
+    hand_press(w, -0.0005);
+    CHECK_NEAR(w->force[2], -0.5, 1e-6);
+    hand_leave(w, row->way);
+    for (int i = 0; i < 60; ++i) {
+      cw_tick(w);
+      CHECK(w->force[2] == 0.0);
+    }
+    hand_press(w, 0.001);
+    hand_press(w, -0.0005);
+    CHECK_NEAR(w->force[2], -0.5, 1e-6);
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include <hapode/grab.h>
 
+#include "haptic/haptic_internal.h"
 #include "session/session_internal.h"
 #include "tests/desk.h"
 
@@ -608,6 +609,45 @@ TEST_EACH(begins, const how_row *row)
   check_vector(desk_state(d).wrench.force, 0.0, 0.0, 0.0, 1e-9);
   double fallen = height - pose_of(d, body).position[2];
   CHECK(fallen > 0.5 * G * 0.08 * 0.08 && fallen < 0.5 * G * 0.1 * 0.1);
+}
+
+/* J, of the energy observer. */
+static double ledger_of(const desk *d)
+{
+  return d->session->haptic->tick.guard.balance;
+}
+
+/* The hand stands pressed into a floor by 1 mm and has stretched the grip by 5 mm. What was in the
+ * grip's spring must not pay for a later force: it is lost, and 0.5 mJ of the floor are left. */
+TEST(what_the_grip_had_stored_is_lost_when_it_lets_go)
+{
+  const double floor_holds = 0.5 * STIFFNESS * 1e-3 * 1e-3;
+  const double grip_holds = 0.5 * STIFFNESS * 5e-3 * 5e-3;
+  for (int sudden = 0; sudden < 2; ++sudden) {
+    desk *d = desk_new(0.0, HAP_MODEL_CONTACT);
+    floor_add(d);
+    dBodyID body = box_add(d, 1.0);
+    dBodySetKinematic(body);
+    desk_run(d, 0.0, 0.0, RADIUS + 0.001);
+    desk_wait(d, 40);
+    desk_move(d, 0.0, 0.0, -0.002, 100);
+    desk_hold(d, body, NULL);
+    desk_wait(d, 100);
+    desk_move(d, 0.005, 0.0, 0.0, 50);
+    desk_wait(d, 20);
+    CHECK_NEAR(desk_state(d).wrench.force[0], -STIFFNESS * 5e-3, 0.01);
+    CHECK_NEAR(ledger_of(d), grip_holds + floor_holds, 0.05 * grip_holds);
+    if (sudden != 0) {
+      dGeomDestroy(dBodyGetFirstGeom(body));
+      dBodyDestroy(body);
+    } else {
+      CHECK(hap_pointer_release(d->session, d->hand) == HAP_OK);
+    }
+    desk_wait(d, 60);
+    CHECK_NEAR(desk_state(d).wrench.force[0], 0.0, 1e-9);
+    CHECK_NEAR(ledger_of(d), floor_holds, 0.05 * grip_holds);
+    tap_release(d);
+  }
 }
 
 TEST(a_body_comes_to_the_pose_that_was_asked_for)
