@@ -173,6 +173,21 @@ TEST(the_mouse_pulls_the_hand)
   CHECK_NEAR(ends[1][2] - ends[0][2], 30.0 * per_pixel, 3e-3);
 }
 
+TEST(a_recording_is_looked_at)
+{
+  char arguments[400];
+  char path[300];
+  display_open();
+  snprintf(path, sizeof path, "%s", folder_path("run.rec"));
+  REQUIRE(run("--scene row10:3 --seconds 0.6 --no-realtime --record %s", path) == 0);
+  snprintf(arguments, sizeof arguments, "--view --shot-size 400x320 --play %s", path);
+  pid_t child = program_start(arguments, NULL);
+  window_drive(child,
+               "xdotool mousemove 200 160 sleep 1 key Left key Right key space sleep 0.3 "
+               "mousemove 200 244 mousedown 1 mousemove 300 244 mouseup 1 key Escape");
+  CHECK(strcmp(line_of("replay: "), "replay: identical") == 0);
+}
+
 TEST(without_a_display_a_sentence_says_so)
 {
   unsetenv("DISPLAY");

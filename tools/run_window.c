@@ -24,6 +24,7 @@
 #define ZOOM 0.9           /* of the distance, for a notch of the wheel */
 #define DEPTH 0.03         /* of the distance, likewise, while the hand is pulled */
 #define LIFT 0.14          /* likewise, of a hand that flies to a body */
+#define CALM_S 0.25        /* in which the view follows what moves */
 #define SEEK_S 0.1         /* of a recording, for a key */
 
 typedef enum window_drag {
@@ -57,14 +58,15 @@ typedef struct run_window_state {
   const run_options *options;
   stage_picture picture;
   bool has_picture;
-  bool camera_free; /* the next picture frames the scene */
+  bool camera_free; /* the view frames what moves, until the mouse is used */
   window_mouse mouse;
   window_play play;
   bool help;
   bool plots;
   bool effects;
   bool labels;
-  double begun; /* s */
+  double begun;  /* s */
+  double step_s; /* since the picture before */
 } run_window_state;
 
 /* ---- the camera ---- */
@@ -269,6 +271,17 @@ static void on_cursor(GLFWwindow *window, double x, double y)
   }
 }
 
+/* A hand that pulls needs an eye that stays. */
+static void camera_hold(run_window_state *w)
+{
+  window_camera c;
+  if (w->camera_free) {
+    camera_get(w, &c);
+    view_set_camera(w->view, c.eye, c.target);
+    w->camera_free = false;
+  }
+}
+
 static void left_press(run_window_state *w)
 {
   const double now = glfwGetTime();
@@ -293,6 +306,7 @@ static void on_button(GLFWwindow *window, int button, int action, int mods)
   if (!w->has_picture) {
     return;
   }
+  camera_hold(w);
   if (action == GLFW_RELEASE) {
     w->mouse.drag = DRAG_NONE;
   } else if (button == GLFW_MOUSE_BUTTON_LEFT) {
@@ -306,6 +320,9 @@ static void on_wheel(GLFWwindow *window, double x, double y)
 {
   run_window_state *w = state_of(window);
   (void)x;
+  if (w->has_picture) {
+    camera_hold(w);
+  }
   if (w->has_picture && w->mouse.drag == DRAG_HAND) {
     hand_deepen(w, y);
   } else if (w->has_picture) {
@@ -541,7 +558,6 @@ static bool picture_show(run_window_state *w)
     w->mouse.drag = DRAG_NONE;
     w->camera_free = !w->options->shot.camera_given;
     view_free_camera(w->view);
-    view_set_calm(w->view, 1.0); /* marks keep their size */
     if (!w->camera_free) {
       view_set_camera(w->view, w->options->shot.camera, &w->options->shot.camera[3]);
     }
@@ -554,12 +570,8 @@ static bool picture_show(run_window_state *w)
             w->labels ? &w->picture.labels : NULL);
   glfwSwapBuffers(w->window);
   w->has_picture = true;
-  if (w->camera_free) { /* framed once: a hand that pulls needs an eye that stays */
-    window_camera c;
-    camera_get(w, &c);
-    view_set_camera(w->view, c.eye, c.target);
-    w->camera_free = false;
-  }
+  /* where the mouse has the view, marks keep their size */
+  view_set_calm(w->view, w->camera_free ? exp(-w->step_s / CALM_S) : 1.0);
   return true;
 }
 
@@ -571,7 +583,8 @@ static void window_loop(run_window_state *w)
   while (!glfwWindowShouldClose(w->window) && !run_loop_stop_wanted() &&
          (!w->picture.is_over || (w->play.wanted && w->picture.end > 0.0))) {
     const double now = glfwGetTime();
-    play_go_on(w, now - last);
+    w->step_s = now - last;
+    play_go_on(w, w->step_s);
     last = now;
     if (!picture_show(w)) {
       break;

@@ -324,7 +324,7 @@ static void text_draw(view *v, const view_frame *frame, const view_strips *strip
                       const view_labels *labels)
 {
   arrow_labels_draw(v, frame);
-  if (v->things.batches[THING_FLOOR].count > 0) {
+  if (v->things.batches[THING_FLOOR].count > 0 && (labels == NULL || !labels->has_slider)) {
     grid_label_draw(&v->ink, grid_cell(v->camera.size), strips != NULL, v->size);
   }
   if (labels != NULL) {
