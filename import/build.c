@@ -203,6 +203,20 @@ static hap_status joint_add(import_work *work, const import_body *body, const im
   return status < HAP_OK ? build_fail(work, joint->at, status, &why) : HAP_OK;
 }
 
+/* Nothing can be felt of it, and no body hangs on it. */
+static bool body_is_nothing(const import_model *model, const import_body *body)
+{
+  bool needed = body->joints->kind != IMPORT_FREE || geoms_count(model, body) > 0;
+  for (const import_body *other = model->bodies->next; other != NULL && !needed;
+       other = other->next) {
+    needed = other->carrier == other && other->parent->carrier == body;
+  }
+  for (const import_hold *hold = model->holds; hold != NULL && !needed; hold = hold->next) {
+    needed = hold->a->carrier == body || hold->b->carrier == body;
+  }
+  return !needed;
+}
+
 /* The body with its joints. The first joint stands on the parent, each further one on the body that
  * the joint before it moves. */
 static hap_status carrier_add(import_work *work, const import_model *model, import_body *body,
@@ -213,6 +227,11 @@ static hap_status carrier_add(import_work *work, const import_model *model, impo
   const import_body *parent = body->parent->carrier;
   const uint32_t parent_number = parent->parent == NULL ? HAP_SCENE_WORLD : parent->number;
   uint32_t below = parent_number;
+  if (body_is_nothing(model, body)) {
+    body->number = HAP_SCENE_WORLD;
+    import_note(work, body->at, "body %.60s left out: it has no geom", body->name);
+    return HAP_OK;
+  }
   hap_geom_def *geoms = import_take(work, (geoms_count(model, body) + 1) * sizeof *geoms);
   if (geoms == NULL) {
     return import_no_memory(work);
@@ -253,7 +272,7 @@ static hap_status passes_add(import_work *work, const import_model *model, hap_s
       import_note(work, a->at,
                   "bodies %.60s and %.60s that do not touch: one never moves, left out",
                   pass->a->name, pass->b->name);
-    } else if (a != b) {
+    } else if (a != b && a->number != HAP_SCENE_WORLD && b->number != HAP_SCENE_WORLD) {
       HAPI_TRY(hap_scene_let_pass(scene, a->number, b->number, work->detail));
     }
   }

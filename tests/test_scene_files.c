@@ -723,6 +723,9 @@ static const struct {
     {IN_WORLD("<geom type='sdf'/>"), "scene.xml:3: geom without a name left out, and its mass"},
     {IN_WORLD("<body gravcomp='1'><joint/><geom size='.1'/></body>"),
      "scene.xml:3: body: gravcomp left out\n"},
+    {IN_WORLD("<body name='a'><freejoint/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"
+              "</body>"),
+     "scene.xml:3: body a left out: it has no geom\n"},
     {IN_WORLD("<pony/>"), "scene.xml:3: pony left out\n"},
 };
 
