@@ -37,7 +37,7 @@ static hap_status include_walk(import_work *work, xml_element *element, size_t *
     }
     HAPI_TRY(include_read(work, *at, files, &root));
     xml_element *rest = (*at)->next;
-    *at = root->children;
+    *at = root != NULL ? root->children : NULL;
     for (; *at != NULL; at = &(*at)->next) {
       (*at)->parent = element;
     }

@@ -67,13 +67,14 @@ static hap_status inline_read(mjcf *m, const xml_element *element, import_mesh *
   if (mesh == NULL || list == NULL) {
     return import_no_memory(m->work);
   }
+  const size_t vertices = numbers / 3;
   for (size_t i = 0; i < corners; ++i) {
-    if (!(faces[i] >= 0.0 && faces[i] < (double)(numbers / 3))) {
+    if (!(faces[i] >= 0.0 && faces[i] < (double)vertices)) {
       return import_refuse(m->work, element->at, "face: there is no vertex %g", faces[i]);
     }
     list[i] = (uint32_t)faces[i];
   }
-  *mesh = (import_mesh){points, list, numbers / 3, corners / 3};
+  *mesh = (import_mesh){points, list, vertices, corners / 3};
   *out = mesh;
   return HAP_OK;
 }
