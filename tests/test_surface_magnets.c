@@ -9,6 +9,7 @@
 #include <hapode/hooks.h>
 #include <hapode/ode.h>
 
+#include "pointer/own_force.h"
 #include "tests/surface_world.h"
 
 #define FORCE 2.0   /* N */
@@ -329,6 +330,27 @@ TEST(the_guard_lets_it_be)
   }
   hap_stats stats = cw_stats(w);
   CHECK(stats.faults.energy_ticks == 0 && stats.faults.fault == HAP_FAULT_NONE);
+}
+
+/* Where coupling AUTO takes a proxy or leaves it, the pull is cut alike: a hand that goes to and fro
+ * there would get the difference in each round. */
+TEST(what_the_device_holds_does_not_leap_with_the_proxy)
+{
+  hapi_pointer p;
+  memset(&p, 0, sizeof p);
+  p.coupling.hold_known = true;
+  p.coupling.own.stiffness = 1000.0;
+  p.coupling.kind = HAP_COUPLING_DIRECT;
+  CHECK(hapi_magnet_hold(&p) == 1000.0);
+  const hap_coupling kinds[] = {HAP_COUPLING_AUTO, HAP_COUPLING_PROXY};
+  for (int i = 0; i < 2; ++i) {
+    p.coupling.kind = kinds[i];
+    p.proxied = false;
+    double without = hapi_magnet_hold(&p);
+    p.proxied = true;
+    CHECK(hapi_magnet_hold(&p) == without);
+    CHECK(without < 1000.0 && without >= 500.0);
+  }
 }
 
 /* Towards one geom, and from the geom's own reach on. */

@@ -20,12 +20,14 @@ static inline double hapi_magnet_share(double way2, double range)
 }
 
 /* N/m, of the pull of a surface: what the device holds; where nobody knows, what was chosen for
- * contacts. HUGE_VAL: there is no device. */
+ * contacts. HUGE_VAL: there is no device. The pull must not leap where coupling AUTO takes a proxy
+ * or leaves it: the hand would get the difference in each round. */
 static inline double hapi_magnet_hold(const hapi_pointer *p)
 {
   double held = p->coupling.own.stiffness;
   bool chosen = !p->coupling.hold_known && held < HUGE_VAL;
-  return chosen ? p->surface.stiffness : p->proxied ? HAPI_SAFETY_MAGNET_LAG * held : held;
+  bool lags = p->proxied || p->coupling.kind != HAP_COUPLING_DIRECT;
+  return chosen ? p->surface.stiffness : lags ? HAPI_SAFETY_MAGNET_LAG * held : held;
 }
 
 /* A body to which a force is bound: its frame, and how that moves. */
