@@ -332,8 +332,8 @@ TEST(the_guard_lets_it_be)
   CHECK(stats.faults.energy_ticks == 0 && stats.faults.fault == HAP_FAULT_NONE);
 }
 
-/* Where coupling AUTO takes a proxy or leaves it, the pull is cut alike: a hand that goes to and fro
- * there would get the difference in each round. */
+/* Where coupling AUTO takes a proxy or leaves it, the pull is cut alike: a hand that goes to and
+ * fro there would get the difference in each round. */
 TEST(what_the_device_holds_does_not_leap_with_the_proxy)
 {
   hapi_pointer p;
@@ -350,6 +350,29 @@ TEST(what_the_device_holds_does_not_leap_with_the_proxy)
     p.proxied = true;
     CHECK(hapi_magnet_hold(&p) == without);
     CHECK(without < 1000.0 && without >= 500.0);
+  }
+}
+
+/* Behind a proxy the pull is that of the tick before, however hard its spring is damped: so says
+ * the page of constants. */
+TEST(behind_a_proxy_the_pull_is_a_tick_old)
+{
+  static const double dampings[] = {0.1, 1.0, 5.0};
+  for (int i = 0; i < 3; ++i) {
+    contact_world *w = magnet_floor(HAP_MODEL_CONTACT);
+    cw_add_floor(w);
+    w->hand_expert.coupling = HAP_COUPLING_PROXY;
+    w->hand_expert.coupling_stiffness = 1000.0;
+    w->hand_expert.coupling_damping = dampings[i];
+    cw_start(w, 0.0, 0.0, RADIUS + 0.02);
+    cw_run(w, 50);
+    for (int k = 0; k < 300; ++k) {
+      double before = w->hand_at[2] - RADIUS;
+      cw_go(w, 0.0, 0.0, -0.05, 1);
+      if (k > 100) { /* it keeps its speed */
+        CHECK_NEAR(w->force[2], -magnet_of(before), 1e-4);
+      }
+    }
   }
 }
 
