@@ -50,7 +50,7 @@ int main(void)
   hand_def.stiffness = 3000; /* N/m: a finger sinks in by 1 mm at 3 N */
   hand_def.damping = 10;
   if (hap_session_create(&def, &ode, &session, &why) < HAP_OK ||
-      hap_device_open("virtual:path=0:-0.06/0/0;1.2:0.06/0/0", &hand_def.device, &why) < HAP_OK ||
+      hap_device_open("virtual:path=0:-0.06/0/0;4:0.34/0/0", &hand_def.device, &why) < HAP_OK ||
       hap_pointer_add(session, &hand_def, &hand) < HAP_OK || hap_session_start(session) < HAP_OK) {
     return fprintf(stderr, "%s\n", why.text), 1;
   }
