@@ -1,12 +1,10 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#define _POSIX_C_SOURCE 200809L /* nanosleep */
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
-#include <time.h>
 
 /* A ball of thick air. What is atomic is read by the frame loop. */
 typedef struct volume {
@@ -41,9 +39,12 @@ int main(void)
   hap_detail why = {""};
   hap_session *session;
   hap_pointer_id hand;
+  hap_session_def session_def;
   hap_ode_def ode_def;
   hap_pointer_def hand_def;
   dInitODE2(0);
+  hap_session_def_init(&session_def, sizeof session_def);
+  session_def.drive = HAP_DRIVE_LOCKSTEP; /* no clock: the program ends at once */
   hap_ode_def_init(&ode_def, sizeof ode_def);
   ode_def.world = dWorldCreate(), ode_def.space = dHashSpaceCreate(NULL);
   hap_pointer_def_init(&hand_def, sizeof hand_def);
@@ -55,7 +56,7 @@ int main(void)
   def.kind = HAP_FORCE_CALL;
   def.call = volume_feel, def.user = &air;
   def.max_force = 3.0, def.max_power = 0.1; /* it brakes, and gives hardly any energy */
-  if (hap_session_create(NULL, &ode_def, &session, &why) < HAP_OK ||
+  if (hap_session_create(&session_def, &ode_def, &session, &why) < HAP_OK ||
       hap_device_open("virtual:path=0:0/0/0;1:0.1/0/0;2:0/0/0", &hand_def.device, &why) < HAP_OK ||
       hap_pointer_add(session, &hand_def, &hand) < HAP_OK ||
       hap_pointer_force_add(session, hand, &def, &id) < HAP_OK ||
@@ -64,8 +65,7 @@ int main(void)
   }
   for (int frame = 0; frame < 120; ++frame) {
     hap_force_state state;
-    nanosleep(&(struct timespec){.tv_nsec = 16666667}, NULL);
-    if (frame % 10 == 0) {
+    if (hap_session_advance(session, 17) >= HAP_OK && frame % 10 == 0) { /* ticks of 1 ms */
       printf("%s, entered %d times\n", air.is_inside ? "inside" : "outside", air.entries);
     }
     if (hap_pointer_force_get(session, hand, id, &state, sizeof state) == HAP_END) {
