@@ -523,6 +523,9 @@ static uint32_t spring_touch(const hapi_lookback *w, const hapi_state_spring *sp
 {
   const hapi_contact_slot *slot =
       spring->slot != HAPI_SLOT_NONE ? &w->near->slots.contacts[spring->slot] : NULL;
+  if (slot != NULL && slot->generation != spring->generation) {
+    return HAPI_NONE; /* another contact has its slot by now */
+  }
   for (uint32_t i = 0; i < w->touches.count; ++i) {
     const hapi_lookback_touch *t = &w->touches.list[i];
     bool same = slot != NULL ? t->geom == slot->geom && t->pointer == slot->pointer &&

@@ -75,8 +75,9 @@ void hapi_nearby_forget_geom(hapi_nearby *nearby, dGeomID geom)
 {
   for (uint32_t i = 0; i < nearby->slots.contact_high; ++i) {
     hapi_contact_slot *slot = &nearby->slots.contacts[i];
-    if (slot->phase == HAPI_SLOT_LIVE && slot->geom == geom) {
+    if (slot->geom == geom) {
       slot->phase = HAPI_SLOT_FREE;
+      slot->geom = NULL; /* a new one may have its address */
     }
   }
   for (uint32_t i = 0; i < nearby->neighbors.candidate_count; ++i) {

@@ -66,7 +66,7 @@ typedef struct hapi_contact_slot {
   uint32_t body;       /* slot, HAPI_SLOT_NONE: static world */
   uint32_t pointer;
   uint32_t pointer_generation;
-  dGeomID geom;         /* compared only, never used */
+  dGeomID geom;         /* compared only, never used; NULL: it is gone */
   uint64_t geom_number; /* of a sphere's: hapi_geom_names_get */
   bool wanted;
   bool hidden; /* by a nearer one, of the same surface */
