@@ -52,7 +52,7 @@ AREAS = [
     ("lib/pointer/device_pace.c", ["device_pace", "false_input"]),
     ("lib/pointer/plausible.c", ["safety_numbers", "false_input", "faults", "late"]),
     ("lib/base/safety.h", GUARD_TESTS + GRIP_TESTS + FEEL_TESTS + WATCH_TESTS +
-     SPIDAR_TESTS + CONTACT_TESTS + ["spidar_guard"]),
+     SPIDAR_TESTS + CONTACT_TESTS + ["spidar_guard", "device_pace"]),
     ("plugins/spidar/guard.c", ["spidar_guard", "spidar"]),
     ("plugins/spidar/belief.c", ["spidar_device", "safety_numbers", "false_input",
                                  "spidar_emulator"]),
