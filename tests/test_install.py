@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""What an installation gives: staged by DESTDIR, the README's program builds against it with
-nothing but pkg-config, by gcc and by clang, shared and static, and runs. Arguments: source root,
-build folder, meson's b_sanitize, prefix, libdir."""
+"""What an installation gives: staged by DESTDIR, then moved elsewhere, the README's program builds
+against it with nothing but pkg-config, by gcc and by clang, and with nothing but CMake, shared and
+static, and runs. Uninstalled, nothing is left. Arguments: source root, build folder, meson's
+b_sanitize, prefix, libdir."""
 import os
 import pathlib
 import shutil
@@ -56,9 +57,67 @@ def build_and_run(stage, compiler, static):
         needs, problem = run(["ldd", program])
         if not problem and "libhapode" in needs:
             problem = "it needs the shared library\n" + needs
-    out, failure = ("", problem) if problem else run(
-        [program], env=dict(os.environ, LD_LIBRARY_PATH="" if static else library))
-    return failure or ("" if "hand feels" in out else "it printed:\n" + out)
+    return problem or run_program(program, "" if static else library)
+
+
+def run_program(program, library):
+    out, problem = run([program], env=dict(os.environ, LD_LIBRARY_PATH=library))
+    return problem or ("" if "hand feels" in out else "it printed:\n" + out)
+
+
+def configured(stage, folder, *wanted):
+    """CMake's set-up of the consumer, with what find_package gets after the name."""
+    return run(["cmake", "-S", os.path.join(root, "tests", "consumer"), "-B", folder,
+                "-DCMAKE_PREFIX_PATH=" + stage + prefix, "-DWANTED=" + ";".join(wanted),
+                "-DPROGRAM=" + os.path.join(root, "examples", "touch_a_cube.c")])[1]
+
+
+def build_by_cmake(stage, static, *wanted):
+    folder = tempfile.mkdtemp(dir=stage)
+    problem = configured(stage, folder, *wanted) or run(["cmake", "--build", folder])[1]
+    program = os.path.join(folder, "consumer")
+    needs, problem = ("", problem) if problem else run(["readelf", "-d", program])
+    if not problem and ("libhapode.so.1]" in needs) == static:
+        problem = "the wrong library is linked\n" + needs
+    return problem or run_program(program, "")
+
+
+def check_cmake(stage, kinds):
+    if not shutil.which("cmake"):
+        skip("CMake", "needs cmake")
+        return
+    version = "0.0.0"
+    for line in pathlib.Path(root, "meson.build").read_text().splitlines():
+        if line.strip().startswith("version: '"):
+            version = line.split("'")[1]
+            break
+    major, minor, patch = version.split(".")
+    point(build_by_cmake(stage, kinds == ["static"]), "the README's program by CMake")
+    for kind in ("shared", "static"):
+        if kind in kinds:
+            point(build_by_cmake(stage, kind == "static", "COMPONENTS", kind),
+                  f"the README's program by CMake, {kind}")
+        else:
+            refused(stage, f"CMake: {kind} is not installed", "libhapode", "COMPONENTS", kind)
+    good = tempfile.mkdtemp(dir=stage)
+    point(configured(stage, good, f"{major}.{minor}"), "CMake: this minor version is found")
+    for other in (f"{major}.{int(minor) + 1}", f"{int(major) + 1}.0",
+                  f"{major}.{minor}.{int(patch) + 1}"):
+        refused(stage, f"CMake: {other} is not found", version, other)
+    refused(stage, "CMake: a component that does not exist", "shared or static", "COMPONENTS",
+            "other")
+
+
+def refused(stage, name, reason, *wanted):
+    said = configured(stage, tempfile.mkdtemp(dir=stage), *wanted)
+    point("" if reason in said else "it said: " + (said or "nothing, it was found"), name)
+
+
+def check_uninstall(stage, log):
+    """As somebody does who changed their mind; meson's own log of what it installed is the list."""
+    point("" if log.exists() else "no log of the installation", "the installation is logged")
+    point(run(["ninja", "-C", build, "uninstall"])[1], "uninstalls")
+    point("\n".join(str(path) for path in pathlib.Path(stage).rglob("*")), "nothing is left")
 
 
 def only(stage, library, keep):
@@ -93,7 +152,7 @@ def missing_docs(stage):
     return "\n".join(str(name) for name in names if not (home / name).is_file())
 
 
-def main(stage):
+def main(stage, moved):
     point(run(["meson", "install", "-C", build, "--no-rebuild", "--quiet", "--destdir", stage])[1],
           "installs to DESTDIR")
     library = pathlib.Path(stage + prefix, libdir)
@@ -112,6 +171,13 @@ def main(stage):
              if (library / name).exists()]
     point("" if kinds else "no library", "a library")
     check_kinds(stage, kinds)
+    # Another place, and nothing at the first one: the package files must not remember it.
+    shutil.copytree(stage, moved, symlinks=True)
+    away = pathlib.Path(stage + prefix)
+    away.rename(str(away) + ".away")
+    point(build_and_run(moved, "cc", "shared" not in kinds), "moved: the README's program by cc")
+    check_cmake(moved, kinds)
+    pathlib.Path(str(away) + ".away").rename(away)
 
 
 if sanitize != "none":
@@ -121,7 +187,22 @@ for tool in ("meson", "pkg-config", "ldd"):
     if not shutil.which(tool):
         print(f"1..0 # SKIP needs {tool}")
         sys.exit(0)
-with tempfile.TemporaryDirectory() as folder:
-    main(folder)
+log_path = pathlib.Path(build, "meson-logs", "install-log.txt")
+log_before = log_path.read_bytes() if log_path.exists() else None
+try:
+    with tempfile.TemporaryDirectory() as folder:
+        first, second = os.path.join(folder, "first"), os.path.join(folder, "second")
+        os.mkdir(first)
+        main(first, second)
+    with tempfile.TemporaryDirectory() as folder:
+        log_path.unlink(missing_ok=True)
+        run(["meson", "install", "-C", build, "--no-rebuild", "--quiet", "--destdir", folder])
+        check_uninstall(folder, log_path)
+finally:
+    # the log of the developer's own installation, which they may want to undo
+    if log_before is not None:
+        log_path.write_bytes(log_before)
+    else:
+        log_path.unlink(missing_ok=True)
 print(f"1..{count}")
 sys.exit(1 if failed else 0)
