@@ -39,6 +39,18 @@ typedef struct hapi_body_left {
   hap_twist twist;
 } hapi_body_left;
 
+/* Since when the body has hardly moved, see body_stay.h. */
+typedef struct hapi_body_stay {
+  uint64_t number; /* no other stay of any body has it; 0: none */
+  uint32_t flags;  /* this and the next three: at its begin */
+  uint32_t row;
+  bool waiting;
+  hap_pose pose;
+  double moved[6]; /* m, rad about world axes, from that pose to the one of this tick */
+  double speed;    /* m/s, sum of the components' sizes */
+  double spin;     /* rad/s, likewise */
+} hapi_body_stay;
+
 /* Hundreds of them are more than a near cache holds: what every tick reads or tells stands
  * together, first that of all models, then that of some; what a sync writes and few ask for comes
  * last. */
@@ -64,6 +76,7 @@ typedef struct hapi_local_body {
   double rotation[9];        /* of pose */
   double inverse_mass;       /* 0 where it is not used: driven and measured ones */
   double inverse_inertia[9]; /* world */
+  hapi_body_stay stay;
 
   hapi_body_linear linear;
   hapi_model_body given; /* of the newest model */
@@ -88,6 +101,7 @@ typedef struct hapi_bodies {
   uint32_t braced;         /* of the model */
   uint32_t high;           /* beyond the highest slot that was ever used */
   uint32_t resting;        /* at the tick's begin */
+  uint64_t stays;          /* numbers of hapi_body_stay that were given, since start */
   bool unsound;            /* a state was not finite in this tick */
   double given;            /* J, of this tick: what things of given motion did on owned bodies */
   double owned_impulse[3]; /* since start, see hapi_state */

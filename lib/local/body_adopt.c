@@ -8,6 +8,7 @@
 #include "base/pose.h"
 #include "base/vec.h"
 #include "local/body_course.h"
+#include "local/body_stay.h"
 
 /* A body that comes in has the world's state, advanced by the age of the model. */
 static void body_enter(hapi_local_body *body, const hapi_model_body *in, double age_s)
@@ -73,8 +74,18 @@ static void body_disown(hapi_local_body *body, const hapi_tick_facts *before)
   }
 }
 
+/* Of rows: a body that answers by what physics measured answers anew with each model. */
+static bool answers_alike(const hapi_model_body *a, const hapi_model_body *b)
+{
+  return ((a->flags | b->flags) & HAPI_BODY_MEASURED) == 0 && a->mass == b->mass &&
+         memcmp(a->inverse_inertia, b->inverse_inertia, sizeof a->inverse_inertia) == 0;
+}
+
 static void take_given(hapi_local_body *body, const hapi_model_body *in)
 {
+  if (!answers_alike(&body->given, in)) {
+    hapi_stay_end(body);
+  }
   body->given = *in;
   body->round = hapi_m3_is_scalar(in->inertia) && hapi_m3_is_scalar(in->inverse_inertia);
   body->forced = false;
@@ -198,6 +209,7 @@ static void bodies_leave(const hapi_bodies *bodies, hapi_model *model,
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     if (!body->live) {
+      hapi_stay_end(body);
       body_disown(body, before);
     }
   }

@@ -11,6 +11,7 @@
 #include "base/plausible.h"
 #include "base/vec.h"
 #include "local/body.h"
+#include "local/body_stay.h"
 #include "local/rows.h"
 
 /* Velocity after the tick if nothing touched the body. */
@@ -41,6 +42,7 @@ static inline void hapi_body_wake(hapi_local_body *body, hapi_rows *rows, double
 {
   hapi_solver *solver = &rows->solver;
   body->flags &= ~(uint32_t)HAPI_BODY_RESTING;
+  hapi_stay_end(body);
   body->pushed = true;
   hapi_body_free_velocity(body, period, solver->v[body->row]);
   memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);

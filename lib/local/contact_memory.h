@@ -8,11 +8,34 @@
 
 #include "sync/messages.h"
 
+/* What the rows of a tick leave to the next one. */
+enum {
+  HAPI_KEPT_NOTHING,
+  HAPI_KEPT_IDLE,  /* no contact of the loop's, whatever the gap */
+  HAPI_KEPT_APART, /* too far open for rows */
+  HAPI_KEPT_ROWS
+};
+
+/* Holds while both bodies stay, see body_stay.h, and no tick was without rows. */
+typedef struct hapi_contact_kept {
+  uint64_t stay_a;
+  uint64_t stay_b;
+  double gap;     /* m, at the poses where the stays began; APART: the least while they last */
+  double reach_a; /* APART: m, from the body's centre to the contact */
+  double reach_b;
+  uint32_t body_a; /* slots */
+  uint32_t body_b;
+  uint32_t first; /* ROWS: where they stand, and how many */
+  uint8_t count;
+  uint8_t what; /* HAPI_KEPT_ */
+} hapi_contact_kept;
+
 /* What is kept of a contact from tick to tick, and from one set of patches to the next. */
 typedef struct hapi_contact_memory {
   uint64_t key;
   double core_a[3];
   double impulse[3]; /* N s: normal, friction 1 and 2 */
+  hapi_contact_kept kept;
 } hapi_contact_memory;
 
 typedef struct hapi_body_contacts {
@@ -24,6 +47,7 @@ typedef struct hapi_body_contacts {
   uint32_t bucket_count; /* power of 2 */
   uint32_t buckets_used; /* likewise; scratch of the matching */
   uint32_t active;       /* that push in this tick */
+  uint64_t rowed_tick;   /* the last one in which rows were made */
 } hapi_body_contacts;
 
 /* The set stays in use, and must stay as it is, until the next call. */

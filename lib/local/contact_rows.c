@@ -6,12 +6,14 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "local/body_stay.h"
 #include "local/body_step.h"
 #include "local/touch_place.h"
 
-/* Contacts between bodies as rows of the solver. Every contact is placed anew from the poses of its
- * bodies; what a row asks for is what the world's own contact joints would ask for (ODE's contact
- * constraint), at the step of the tick. */
+/* Contacts between bodies as rows of the solver. A contact is placed anew from the poses of its
+ * bodies, and while both stay where they were its rows stay as well: only the gap follows, along
+ * the Jacobian of the normal's row. What a row asks for is what the world's own contact joints
+ * would ask for (ODE's contact constraint), at the step of the tick. */
 
 /* 84 degrees of slope. More than that may push without bound along a contact that hardly touches:
  * where a large island is not solved to the end within a tick, what lets go then gives energy. */
@@ -33,7 +35,8 @@ typedef struct placed_contact {
   double normal[3]; /* from b to a */
   double point[3];  /* between the surfaces */
   double gap;
-  bool gives; /* see hapi_row_source */
+  bool follows; /* see hapi_touch_spot */
+  bool gives;   /* see hapi_row_source */
 } placed_contact;
 
 static hapi_touch_frame frame_of(const hapi_local_body *body)
@@ -53,6 +56,7 @@ static bool contact_place(placed_contact *c)
   hapi_v3_copy(spot.normal, c->normal);
   hapi_v3_copy(spot.point, c->point);
   c->gap = spot.gap;
+  c->follows = spot.follows;
   return true;
 }
 
@@ -312,9 +316,9 @@ static bool find_contact(const hapi_body_contacts *contacts, const hapi_bodies *
   HAPI_ASSERT_INDEX(index, patches->contact_count);
   out->in = &hapi_patches_contacts(patches)[index];
   out->surface = &hapi_patches_surfaces(patches)[out->in->surface];
-  return find_body(bodies, out->in->body_a, out->in->generation_a, &out->a) &&
-         find_body(bodies, out->in->body_b, out->in->generation_b, &out->b) &&
-         (hapi_body_responds(out->a) || hapi_body_responds(out->b)) &&
+  bool has_a = find_body(bodies, out->in->body_a, out->in->generation_a, &out->a);
+  bool has_b = find_body(bodies, out->in->body_b, out->in->generation_b, &out->b);
+  return has_a && has_b && (hapi_body_responds(out->a) || hapi_body_responds(out->b)) &&
          (hapi_body_is_owned(out->a) || hapi_body_is_owned(out->b)); /* others are ODE's affair */
 }
 
@@ -333,20 +337,167 @@ void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bo
   }
 }
 
+/* ---- what is kept ---- */
+
+/* m, more than a contact may come nearer while its bodies stay: from one end of their ways to the
+ * other. */
+static double most_closing(const hapi_contact_kept *kept)
+{
+  return 8.0 * HAPI_STAY_WAY + 4.0 * HAPI_STAY_TURN * (kept->reach_a + kept->reach_b);
+}
+
+static double reach_of(const hapi_local_body *body, const double point[3])
+{
+  double arm[3];
+  if (body == NULL) {
+    return 0.0;
+  }
+  hapi_body_arm(body, point, arm);
+  return fabs(arm[0]) + fabs(arm[1]) + fabs(arm[2]);
+}
+
+/* For the next tick. first: of its rows, if it has some. */
+static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t what,
+                         uint32_t first, hapi_contact_kept *out)
+{
+  out->what = HAPI_KEPT_NOTHING;
+  out->stay_a = hapi_stay_number(c->a);
+  out->stay_b = hapi_stay_number(c->b);
+  if (out->stay_a == HAPI_STAY_UNKNOWN || out->stay_b == HAPI_STAY_UNKNOWN) {
+    return;
+  }
+  out->what = what;
+  out->body_a = c->in->body_a;
+  out->body_b = c->in->body_b;
+  if (what == HAPI_KEPT_APART) {
+    out->reach_a = reach_of(c->a, c->point);
+    out->reach_b = reach_of(c->b, c->point);
+    out->gap = c->gap - most_closing(out);
+  } else if (what == HAPI_KEPT_ROWS) {
+    const hapi_row *normal = &rows->solver.rows[first];
+    out->first = first;
+    out->count = (uint8_t)(rows->solver.row_count - first);
+    out->gap = c->gap - hapi_stay_moved(c->a, normal->ja) - hapi_stay_moved(c->b, normal->jb);
+  }
+}
+
+static double most_speed(const hapi_local_body *body, double reach)
+{
+  return body != NULL ? body->stay.speed + reach * body->stay.spin : 0.0;
+}
+
+static bool still_apart(const hapi_contact_kept *kept, const hapi_local_body *a,
+                        const hapi_local_body *b, double period)
+{
+  double speed = most_speed(a, kept->reach_a) + most_speed(b, kept->reach_b);
+  return kept->gap > OPEN_FLOOR + OPEN_TICKS * period * speed;
+}
+
+static bool rows_usable(const hapi_row *row, uint32_t count)
+{
+  bool usable = true;
+  for (uint32_t i = 0; i < count; ++i) {
+    usable = usable && row[i].inverse != 0.0 && hapi_finite(&row[i].impulse, 1);
+  }
+  return usable;
+}
+
+/* The rows of the tick before again, at the place that comes next; false: they have to be made. The
+ * rows of this tick so far may have written over what stood before that place. */
+static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *memory,
+                       const hapi_tick_facts *facts, hapi_effect_sample *sample)
+{
+  hapi_solver *solver = &rows->solver;
+  hapi_contact_kept *kept = &memory->kept;
+  uint32_t first = solver->row_count;
+  const hapi_row *was = &solver->rows[kept->first];
+  uint32_t count = kept->count;
+  uint8_t parts[3];
+  if (kept->first < first || !rows_usable(was, count)) {
+    return false;
+  }
+  HAPI_ASSERT(kept->first + count <= rows->capacity);
+  c->gap = kept->gap + hapi_stay_moved(c->a, was->ja) + hapi_stay_moved(c->b, was->jb);
+  if (c->gap > OPEN_FLOOR || list_parts(c, memory, parts) != count) {
+    return false;
+  }
+  if (kept->first > first) {
+    memmove(&solver->rows[first], was, count * sizeof *was);
+    memmove(&rows->sources[first], &rows->sources[kept->first], count * sizeof *rows->sources);
+    for (uint32_t i = 1; i < count; ++i) {
+      hapi_row *row = &solver->rows[first + i];
+      row->normal = row->normal < 0 ? -1 : (int32_t)first;
+    }
+    kept->first = first;
+  }
+  rows->sources[first].pushes_out = false;
+  set_normal(facts, c, &solver->rows[first], &rows->sources[first], sample);
+  solver->row_count += count;
+  hapi_contact_again(solver, first, count);
+  return true;
+}
+
+/* False: the contact has to be placed. */
+static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bodies, uint32_t index,
+                            hapi_rows *rows, const hapi_tick_facts *facts,
+                            hapi_effect_sample *sample)
+{
+  hapi_contact_memory *memory = &contacts->memory[index];
+  const hapi_contact_kept *kept = &memory->kept;
+  if (kept->what == HAPI_KEPT_NOTHING) {
+    return false;
+  }
+  placed_contact c;
+  c.a = hapi_bodies_at(bodies, kept->body_a);
+  c.b = hapi_bodies_at(bodies, kept->body_b);
+  if (hapi_stay_number(c.a) != kept->stay_a || hapi_stay_number(c.b) != kept->stay_b) {
+    return false;
+  }
+  if (kept->what == HAPI_KEPT_IDLE) {
+    return true;
+  }
+  if (kept->what == HAPI_KEPT_APART) {
+    return still_apart(kept, c.a, c.b, facts->period);
+  }
+  const hapi_patch_contact *in = &hapi_patches_contacts(contacts->patches)[index];
+  c.surface = &hapi_patches_surfaces(contacts->patches)[in->surface];
+  return rows_go_on(rows, &c, memory, facts, sample);
+}
+
+static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies, uint32_t index,
+                         hapi_rows *rows, const hapi_tick_facts *facts, hapi_effect_sample *sample)
+{
+  hapi_contact_memory *memory = &contacts->memory[index];
+  uint32_t first = rows->solver.row_count;
+  placed_contact c;
+  memory->kept.what = HAPI_KEPT_NOTHING;
+  if (!find_contact(contacts, bodies, index, &c)) {
+    contact_keep(rows, &c, HAPI_KEPT_IDLE, first, &memory->kept);
+  } else if (first + 3 <= rows->capacity && contact_place(&c)) {
+    bool near = is_near(&c, facts->period);
+    if (near) {
+      add_contact(rows, &c, memory, facts, sample);
+    }
+    if (c.follows) {
+      contact_keep(rows, &c, near ? HAPI_KEPT_ROWS : HAPI_KEPT_APART, first, &memory->kept);
+    }
+  }
+  if (rows->solver.row_count == first) {
+    memset(memory->impulse, 0, sizeof memory->impulse);
+  }
+}
+
 void hapi_contact_rows(hapi_body_contacts *contacts, const hapi_bodies *bodies, hapi_rows *rows,
                        const hapi_tick_facts *facts, hapi_effect_sample *sample)
 {
   if (contacts->patches == NULL) {
     return;
   }
+  bool goes_on = contacts->rowed_tick + 1 == facts->tick;
   for (uint32_t i = 0; i < contacts->patches->contact_count; ++i) {
-    placed_contact c;
-    bool room = rows->solver.row_count + 3 <= rows->capacity;
-    if (find_contact(contacts, bodies, i, &c) && room && contact_place(&c) &&
-        is_near(&c, facts->period)) {
-      add_contact(rows, &c, &contacts->memory[i], facts, sample);
-    } else {
-      memset(contacts->memory[i].impulse, 0, sizeof contacts->memory[i].impulse);
+    if (!goes_on || !contact_goes_on(contacts, bodies, i, rows, facts, sample)) {
+      contact_make(contacts, bodies, i, rows, facts, sample);
     }
   }
+  contacts->rowed_tick = facts->tick;
 }

@@ -63,6 +63,12 @@ static inline void surface_point(const side *s, const double direction[3], doubl
 
 #define SLIDE_MAX 0.1 /* m between two passes */
 
+/* Limits of hapi_touch_spot.follows: over the way and the turn of body_stay.h the gap is off by no
+ * more than 1e-9 m, for arms of 0.1 m. */
+#define FOLLOW_ASIDE 5e-5 /* m across the normal between the two points */
+#define FOLLOW_SLOPE 5e-4 /* of what slides against the face */
+#define FOLLOW_ACROSS 0.1 /* sine of the angle between crossing edges */
+
 /* The point of the pushed body goes on to where the border of the face is now. */
 static void point_slide(const touch *c, double a[3], double b[3])
 {
@@ -80,12 +86,16 @@ static void point_slide(const touch *c, double a[3], double b[3])
     if (fabs(way) < SLIDE_MAX) { /* false for edges that have become parallel */
       hapi_v3_madd(pushed, way, edge, pushed);
     }
+    double slope = fabs(hapi_v3_dot(edge, c->out->normal));
+    c->out->follows &= slope <= FOLLOW_SLOPE * fabs(hapi_v3_dot(edge, border));
   } else if (c->in->slide == HAPI_SLIDE_CORNER) {
     frame_vector(face_is_a ? c->b : c->a, face_is_a ? c->in->edge_b : c->in->edge_a, edge);
     double up = -hapi_v3_dot(apart, edge) / hapi_v3_dot(c->out->normal, edge);
     if (fabs(up) < SLIDE_MAX) {
       hapi_v3_madd(fixed, up, c->out->normal, pushed);
     }
+    double along = hapi_v3_dot(c->out->normal, edge);
+    c->out->follows &= 1.0 - along * along <= FOLLOW_SLOPE * FOLLOW_SLOPE;
   }
 }
 
@@ -105,6 +115,9 @@ static void place_surfaces(const touch *c)
   hapi_v3_sub(a, b, apart);
   c->out->gap = hapi_v3_dot(c->out->normal, apart);
   hapi_v3_madd(a, -0.5 * c->out->gap, c->out->normal, c->out->point);
+  double aside2 = hapi_v3_dot(apart, apart) - c->out->gap * c->out->gap;
+  c->out->follows &= !(in->rim_a > 0.0) && !(in->rim_b > 0.0) &&
+                     (in->touch == HAPI_TOUCH_FACE_B || aside2 <= FOLLOW_ASIDE * FOLLOW_ASIDE);
 }
 
 /* Crossing edges: the normal turns with both. Edges that have become parallel keep the last one. */
@@ -122,6 +135,7 @@ static void edge_normal(const touch *c)
     double sign = hapi_v3_dot(across, c->in->normal) < 0.0 ? -1.0 : 1.0;
     hapi_v3_scale(sign / length, across, c->out->normal);
   }
+  c->out->follows = length >= FOLLOW_ACROSS;
 }
 
 /* A ball is asked anew where it touches the other shape. */
@@ -149,6 +163,7 @@ bool hapi_touch_place(const hapi_patch_contact *in, const hapi_touch_frame *a,
   /* cppcheck-suppress ctuuninitvar ; out is written only, its normal before it is read */
   const touch at = {in, a, b, out};
   const touch *c = &at;
+  out->follows = true;
   switch (c->in->touch) {
     case HAPI_TOUCH_FACE_A:
       frame_vector(c->a, c->in->normal, c->out->normal);

@@ -20,6 +20,8 @@ typedef struct hapi_touch_spot {
   double normal[3]; /* world, unit, from b to a */
   double point[3];  /* world, between the surfaces */
   double gap;       /* m */
+  bool follows;     /* while the bodies go a little way, the gap goes as the two bodies there move
+                   along the normal, and the spot goes with them */
 } hapi_touch_spot;
 
 /* False: there is no answer (a ball against a hull). */

@@ -46,6 +46,13 @@ static bool has_bounds(const hapi_solver *solver, uint32_t index)
          same_bodies(row, &solver->rows[row->normal]);
 }
 
+/* m/s, by a partner that does not respond */
+static double row_carried(const hapi_solver *solver, const hapi_row *row)
+{
+  bool moved = !row->paired && !row->single;
+  return moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0;
+}
+
 /* A row left out keeps no impulse: its normal's frictions get none either. */
 static void row_prepare(hapi_solver *solver, uint32_t index)
 {
@@ -63,8 +70,7 @@ static void row_prepare(hapi_solver *solver, uint32_t index)
   row->response = d;
   row->moves_a = of_a != 0.0;
   row->paired = of_b != 0.0;
-  bool moved = !row->paired && !row->single; /* by a partner that does not respond */
-  row->drive = row->target - (moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0);
+  row->drive = row->target - row_carried(solver, row);
 }
 
 static double rows_couple(const hapi_row *row, const hapi_row *other)
@@ -148,6 +154,16 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
     if (r[i].inverse != 0.0) {
       warm_start(solver, &r[i]);
     }
+  }
+}
+
+void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count)
+{
+  for (uint32_t i = first; i < first + count; ++i) {
+    hapi_row *row = &solver->rows[i];
+    HAPI_ASSERT(row->inverse != 0.0 && row->a < solver->body_count);
+    row->drive = row->target - row_carried(solver, row);
+    warm_start(solver, row);
   }
 }
 

@@ -85,6 +85,10 @@ void hapi_single_ready(hapi_solver *solver, uint32_t index, double response);
  * frictions. */
 void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
 
+/* The same of rows that were ready in the last run, all of use, with the impulses of that run and
+ * with another target. */
+void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count);
+
 /* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */
 
 /* A few sweeps more, two at least. */

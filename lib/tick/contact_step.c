@@ -6,6 +6,7 @@
 #include "base/assert.h"
 #include "base/pose.h"
 #include "local/body_course.h"
+#include "local/body_stay.h"
 #include "local/body_step.h"
 #include "local/brace_rows.h"
 #include "local/contact_rows.h"
@@ -65,6 +66,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
     }
     body_begin(body, patches);
     body->row = solver->body_count++;
+    hapi_stay_follow(bodies, body);
     hapi_body_free_velocity(body, facts->period, solver->v[body->row]);
     memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
     bodies->resting += (body->flags & HAPI_BODY_RESTING) != 0;
