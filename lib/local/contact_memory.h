@@ -25,8 +25,10 @@ typedef struct hapi_contact_kept {
   double reach_b;
   uint32_t body_a; /* slots */
   uint32_t body_b;
-  uint32_t first; /* ROWS: where they stand, and how many */
+  uint32_t first;   /* ROWS: where they stand, and how many */
+  uint32_t surface; /* of the patches */
   uint8_t count;
+  bool all;     /* ROWS: one for each part that the surface has, whether the bodies touch or not */
   uint8_t what; /* HAPI_KEPT_ */
 } hapi_contact_kept;
 

@@ -360,6 +360,7 @@ static double reach_of(const hapi_local_body *body, const double point[3])
 static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t what,
                          uint32_t first, hapi_contact_kept *out)
 {
+  const uint32_t approx = HAPI_SURFACE_APPROX1_1 | HAPI_SURFACE_APPROX1_2;
   out->what = HAPI_KEPT_NOTHING;
   out->stay_a = hapi_stay_number(c->a);
   out->stay_b = hapi_stay_number(c->b);
@@ -376,7 +377,12 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
   } else if (what == HAPI_KEPT_ROWS) {
     const hapi_row *normal = &rows->solver.rows[first];
     out->first = first;
+    out->surface = c->in->surface;
     out->count = (uint8_t)(rows->solver.row_count - first);
+    out->all = (c->surface->flags & approx) == approx;
+    for (uint32_t i = 0; i < out->count; ++i) {
+      out->what = normal[i].inverse != 0.0 ? out->what : HAPI_KEPT_NOTHING;
+    }
     out->gap = c->gap - hapi_stay_moved(c->a, normal->ja) - hapi_stay_moved(c->b, normal->jb);
   }
 }
@@ -393,13 +399,13 @@ static bool still_apart(const hapi_contact_kept *kept, const hapi_local_body *a,
   return kept->gap > OPEN_FLOOR + OPEN_TICKS * period * speed;
 }
 
-static bool rows_usable(const hapi_row *row, uint32_t count)
+static bool impulses_finite(const hapi_row *row, uint32_t count)
 {
-  bool usable = true;
-  for (uint32_t i = 0; i < count; ++i) {
-    usable = usable && row[i].inverse != 0.0 && hapi_finite(&row[i].impulse, 1);
+  double sum = row[0].impulse;
+  for (uint32_t i = 1; i < count; ++i) {
+    sum += row[i].impulse;
   }
-  return usable;
+  return hapi_finite(&sum, 1);
 }
 
 /* The rows of the tick before again, at the place that comes next; false: they have to be made. The
@@ -413,12 +419,12 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   const hapi_row *was = &solver->rows[kept->first];
   uint32_t count = kept->count;
   uint8_t parts[3];
-  if (kept->first < first || !rows_usable(was, count)) {
+  if (kept->first < first || !impulses_finite(was, count)) {
     return false;
   }
   HAPI_ASSERT(kept->first + count <= rows->capacity);
   c->gap = kept->gap + hapi_stay_moved(c->a, was->ja) + hapi_stay_moved(c->b, was->jb);
-  if (c->gap > OPEN_FLOOR || list_parts(c, memory, parts) != count) {
+  if (c->gap > OPEN_FLOOR || (!kept->all && list_parts(c, memory, parts) != count)) {
     return false;
   }
   if (kept->first > first) {
@@ -459,8 +465,7 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
   if (kept->what == HAPI_KEPT_APART) {
     return still_apart(kept, c.a, c.b, facts->period);
   }
-  const hapi_patch_contact *in = &hapi_patches_contacts(contacts->patches)[index];
-  c.surface = &hapi_patches_surfaces(contacts->patches)[in->surface];
+  c.surface = &hapi_patches_surfaces(contacts->patches)[kept->surface];
   return rows_go_on(rows, &c, memory, facts, sample);
 }
 

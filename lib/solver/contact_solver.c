@@ -46,13 +46,6 @@ static bool has_bounds(const hapi_solver *solver, uint32_t index)
          same_bodies(row, &solver->rows[row->normal]);
 }
 
-/* m/s, by a partner that does not respond */
-static double row_carried(const hapi_solver *solver, const hapi_row *row)
-{
-  bool moved = !row->paired && !row->single;
-  return moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0;
-}
-
 /* A row left out keeps no impulse: its normal's frictions get none either. */
 static void row_prepare(hapi_solver *solver, uint32_t index)
 {
@@ -70,7 +63,8 @@ static void row_prepare(hapi_solver *solver, uint32_t index)
   row->response = d;
   row->moves_a = of_a != 0.0;
   row->paired = of_b != 0.0;
-  row->drive = row->target - row_carried(solver, row);
+  bool moved = !row->paired && !row->single; /* by a partner that does not respond */
+  row->drive = row->target - (moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0);
 }
 
 static double rows_couple(const hapi_row *row, const hapi_row *other)
@@ -157,16 +151,6 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
   }
 }
 
-void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count)
-{
-  for (uint32_t i = first; i < first + count; ++i) {
-    hapi_row *row = &solver->rows[i];
-    HAPI_ASSERT(row->inverse != 0.0 && row->a < solver->body_count);
-    row->drive = row->target - row_carried(solver, row);
-    warm_start(solver, row);
-  }
-}
-
 /* ---- sweeps ---- */
 
 /* The correction of one row, m/s. The rows of a body wait for each other, so that the way from v to
@@ -239,6 +223,41 @@ static double update_triple(hapi_solver *solver, hapi_row *r)
     largest = correction > largest ? correction : largest;
   }
   return largest;
+}
+
+/* As three warm starts, but the velocities are read and written once. */
+static void warm_triple(hapi_solver *solver, hapi_row *r)
+{
+  double d[3];
+  d[0] = r[0].impulse = hapi_clamp(r[0].impulse, r[0].lo, r[0].hi);
+  for (int i = 1; i < 3; ++i) {
+    double most = hapi_friction_most(&r[i], hapi_row_load(&r[0]));
+    d[i] = r[i].impulse = hapi_clamp(r[i].impulse, -most, most);
+  }
+  if (d[0] == 0.0 && d[1] == 0.0 && d[2] == 0.0) {
+    return;
+  }
+  push_triple(solver->v[r->a], d, r[0].ba, r[1].ba, r[2].ba);
+  if (r->paired) {
+    push_triple(solver->v[r->b], d, r[0].bb, r[1].bb, r[2].bb);
+  }
+}
+
+void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count)
+{
+  hapi_row *r = &solver->rows[first];
+  for (uint32_t i = 0; i < count; ++i) {
+    HAPI_ASSERT(r[i].inverse != 0.0 && r[i].a < solver->body_count);
+    bool moved = !r[i].paired && !r[i].single; /* by a partner that does not respond */
+    r[i].drive = r[i].target - (moved ? hapi_dot6(r[i].jb, solver->v[r[i].b]) : 0.0);
+  }
+  if (r->triple) {
+    warm_triple(solver, r);
+    return;
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    warm_start(solver, &r[i]);
+  }
 }
 
 double hapi_ball_wanted(const hapi_row *first, double radius, const double errors[3], double out[3],
