@@ -35,7 +35,7 @@ enum {
   HAPI_SURFACE_SLIP2 = 64
 };
 
-/* A point of hapi_patch in the frames of its two bodies; the loop places it anew at every tick.
+/* A point of hapi_patch in the frames of its two bodies; the loop places it anew where they move.
  * Static world: world frame. */
 typedef struct hapi_patch_contact {
   uint64_t key; /* of the pair; contacts of a pair follow each other */
