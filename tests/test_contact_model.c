@@ -795,3 +795,29 @@ TEST(a_hand_does_not_move_a_kinematic_body)
   CHECK_NEAR(-w->force[0], 2000.0 * 4.5e-3 + 20.0 * 0.01, 0.05);
   CHECK(dBodyGetPosition(body)[0] == 0.0 && dBodyGetLinearVel(body)[0] == 0.0);
 }
+
+/* ODE makes no contact of a corner that is above the floor, be it by a picometre, and a body that
+ * the loop gives back then falls on that side for a step. The cube is put beside the row with one
+ * corner in bare touch, and the loop gives it back after some 0.2 s. */
+TEST(what_rests_is_given_back_at_rest)
+{
+  for (int i = 0; i < 4; ++i) {
+    contact_world *w = cw_new(CW_GRAVITY);
+    double worst = 0.0;
+    cw_add_floor(w);
+    cw_add_cube(w, 0.2, 0.05, 0.0, 0.0, 0.025);
+    dBodyID cube = cw_add_cube(w, 0.1 * (i + 1), 0.05, 0.05, 0.0, 0.025);
+    const hap_pose put = {{0.12, 0.01 * i, 0.025 - 1e-7},
+                          {1.0, i & 1 ? 1e-6 : -1e-6, i & 2 ? 1e-6 : -1e-6, 0.0}};
+    w->surface.mu = 0.5;
+    w->def.physics_hz = 60.0;
+    cw_start(w, -0.04, 0.0, 0.025);
+    cw_go(w, 0.02, 0.0, 0.0, 700);
+    REQUIRE(hap_session_teleport_body(w->session, cube, &put) >= HAP_OK);
+    for (int k = 0; k < 1000; ++k) {
+      cw_tick(w);
+      worst = fmax(worst, fabs(dBodyGetPosition(cube)[2] - 0.025));
+    }
+    CHECK_SAY(worst < 1e-6, "%d: %g m", i, worst);
+  }
+}

@@ -73,7 +73,8 @@ static double corner_height(const hap_pose *pose, int i)
 }
 
 typedef struct follow_result {
-  double error; /* m, the largest */
+  double error; /* m, the largest by which a gap counts as wider */
+  double least; /* m, the same, the smallest */
   int kept;     /* ticks in which the rows were those of the tick before */
   int anew;
 } follow_result;
@@ -81,7 +82,7 @@ typedef struct follow_result {
 /* Free of forces over the floor: an open row asks for -gap / T, whatever the others ask for. */
 static follow_result gap_follow(const double v[3], const double w[3], int ticks)
 {
-  follow_result r = {0.0, 0, 0};
+  follow_result r = {0.0, 0.0, 0, 0};
   double was[6] = {0.0};
   set_up();
   f.tick.hashing = false;
@@ -96,7 +97,8 @@ static follow_result gap_follow(const double v[3], const double w[3], int ticks)
     REQUIRE(f.tick.rows.solver.row_count == 12);
     for (int i = 0; i < 4; ++i) {
       double gap = -T * f.rows[3 * i].target;
-      r.error = fmax(r.error, fabs(gap - corner_height(&before, i)));
+      r.error = fmax(r.error, gap - corner_height(&before, i));
+      r.least = fmin(r.least, gap - corner_height(&before, i));
     }
     bool same = memcmp(was, f.rows[0].ja, sizeof was) == 0;
     r.kept += same;
@@ -117,8 +119,9 @@ TEST(gaps_follow_bodies_that_tilt_and_creep)
   };
   for (size_t i = 0; i < sizeof ways / sizeof ways[0]; ++i) {
     follow_result r = gap_follow(ways[i], ways[i] + 3, 600);
-    printf("# %zu: off by %.2g m; rows kept in %d ticks, made in %d\n", i, r.error, r.kept, r.anew);
-    CHECK(r.error < 1e-9);
+    printf("# %zu: wider by %.2g to %.2g m; rows kept in %d ticks, made in %d\n", i, r.least,
+           r.error, r.kept, r.anew);
+    CHECK(r.error < 3e-9 && r.least > -1e-15); /* so that what rests stays in touch */
     CHECK(r.kept > 400);
     CHECK(i == 0 || r.anew > 10);
   }
@@ -130,7 +133,7 @@ TEST(a_body_that_goes_far_in_a_tick_is_placed_in_each)
   static const double w[3] = {0.0, 0.02, 0.0};
   follow_result r = gap_follow(v, w, 100);
   CHECK(r.kept == 0);
-  CHECK(r.error < 1e-15);
+  CHECK(r.error < 1e-15 && r.least > -1e-15);
 }
 
 /* At rest on the floor, pressed by its weight. */

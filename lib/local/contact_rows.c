@@ -339,6 +339,11 @@ void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bo
 
 /* ---- what is kept ---- */
 
+/* m, twice what the gap of a kept contact may be off by (touch_place.c). The gap counts as so much
+ * wider. So what rests is never lifted out of the touch that the world's collision sees, and is
+ * still held there when the loop gives it back. */
+#define FOLLOW_MARGIN 2e-9
+
 /* m, more than a contact may come nearer while its bodies stay: from one end of their ways to the
  * other. */
 static double most_closing(const hapi_contact_kept *kept)
@@ -383,7 +388,8 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
     for (uint32_t i = 0; i < out->count; ++i) {
       out->what = normal[i].inverse != 0.0 ? out->what : HAPI_KEPT_NOTHING;
     }
-    out->gap = c->gap - hapi_stay_moved(c->a, normal->ja) - hapi_stay_moved(c->b, normal->jb);
+    out->gap = FOLLOW_MARGIN + c->gap - hapi_stay_moved(c->a, normal->ja) -
+               hapi_stay_moved(c->b, normal->jb);
   }
 }
 
