@@ -671,3 +671,91 @@ TEST(mistakes_name_the_field)
   CHECK(hap_scene_destroy(NULL) == HAP_OK);
   CHECK(hap_scene_destroy(scene) == HAP_OK);
 }
+
+/* ---- in a session ---- */
+
+/* A box that lies on the floor with a capsule on a hinge and a cylinder on a ball joint, at rest
+ * before a hand comes. Stops of the hinge come and go beside the rows of contacts. */
+static hap_scene *three_make(void)
+{
+  hap_scene *s = NULL;
+  uint32_t n[3];
+  uint32_t k;
+  hap_geom_def g;
+  hap_joint_def j;
+  REQUIRE(hap_scene_create(NULL, &s, NULL) >= HAP_OK);
+  hap_geom_def_init(&g, sizeof g);
+  g.shape = HAP_SHAPE_PLANE;
+  g.friction = 1.0;
+  REQUIRE(hap_scene_add_geom(s, &g, &k, NULL) >= HAP_OK);
+  for (int i = 0; i < 3; ++i) {
+    hap_body_def b;
+    const double side = i == 0 ? 0.0 : i == 1 ? 1.0 : -1.0;
+    hap_geom_def_init(&g, sizeof g);
+    hap_body_def_init(&b, sizeof b);
+    g.shape = i == 0 ? HAP_SHAPE_BOX : i == 1 ? HAP_SHAPE_CAPSULE : HAP_SHAPE_CYLINDER;
+    g.friction = 1.0;
+    g.category_bits = g.collide_bits = 1;
+    if (i == 0) {
+      g.edges[0] = g.edges[1] = 0.2;
+      g.edges[2] = 0.1;
+    } else {
+      g.radius = 0.03;
+      g.length = 0.2;
+      g.pose.quat_wxyz[0] = g.pose.quat_wxyz[2] = sqrt(0.5);
+      g.pose.quat_wxyz[2] *= -side;
+      g.pose.position[0] = 0.1 * side;
+    }
+    b.geoms = &g;
+    b.geom_count = 1;
+    b.pose.position[0] = 0.15 * side;
+    b.pose.position[2] = 0.3;
+    REQUIRE(hap_scene_add_body(s, &b, &n[i], NULL, NULL) >= HAP_OK);
+  }
+  for (int i = 1; i < 3; ++i) {
+    hap_joint_def_init(&j, sizeof j);
+    j.kind = i == 1 ? HAP_JOINT_HINGE : HAP_JOINT_BALL;
+    j.body_a = n[i];
+    j.body_b = n[0];
+    j.anchor[0] = i == 1 ? 0.15 : -0.15;
+    j.anchor[2] = 0.3;
+    if (i == 1) {
+      j.axis[0][0] = j.axis[0][2] = 0.0;
+      j.axis[0][1] = 1.0;
+      j.low[0] = -M_PI / 3.0;
+      j.high[0] = M_PI / 3.0;
+    }
+    REQUIRE(hap_scene_add_joint(s, &j, &k, NULL) >= HAP_OK);
+  }
+  return s;
+}
+
+TEST(what_has_come_to_rest_on_joints_stays_on_the_floor)
+{
+  hap_scene *s = three_make();
+  hap_session *session = NULL;
+  hap_session_def d;
+  hap_pointer_def p;
+  hap_pointer_id id;
+  double top = 0.0;
+  hap_session_def_init(&d, sizeof d);
+  d.drive = HAP_DRIVE_LOCKSTEP;
+  REQUIRE(hap_scene_session(s, &d, &session, NULL) >= HAP_OK);
+  hap_pointer_def_init(&p, sizeof p);
+  p.radius = 0.0222;
+  REQUIRE(hap_device_open("virtual:path=0:-0.4416/0/0.3958;0.75:0/0/0.3;1.5:0/0/0.0222;"
+                          "2.25:0.25/0/0.3;3:0.25/0/0.0222",
+                          &p.device, NULL) >= HAP_OK);
+  REQUIRE(hap_pointer_add(session, &p, &id) >= HAP_OK);
+  REQUIRE(hap_session_start(session) >= HAP_OK);
+  for (int t = 0; t < 3000; ++t) {
+    hap_scene_body q;
+    REQUIRE(hap_session_advance(session, 1) >= HAP_OK);
+    REQUIRE(hap_scene_get_body(s, 0, &q, sizeof q) >= HAP_OK);
+    top = t > 400 ? fmax(top, q.pose.position[2]) : 0.0;
+  }
+  CHECK_SAY(top < 0.06, "%g m", top);
+  hap_session_destroy(session);
+  hap_device_close(p.device);
+  REQUIRE(hap_scene_destroy(s) >= HAP_OK);
+}

@@ -414,8 +414,19 @@ static bool impulses_finite(const hapi_row *row, uint32_t count)
   return hapi_finite(&sum, 1);
 }
 
-/* The rows of the tick before again, at the place that comes next; false: they have to be made. The
- * rows of this tick so far may have written over what stood before that place. */
+/* Whether the rows of the tick before are where they stood. Rows of this tick so far may have been
+ * written over them, also such as were taken back: a stop of a joint that is too far away. */
+static bool rows_stand(const hapi_rows *rows, const hapi_contact_kept *kept, uint32_t index)
+{
+  const hapi_row_source *source = &rows->sources[kept->first];
+  bool own = kept->first >= rows->solver.row_count;
+  for (uint32_t i = 0; i < kept->count && own; ++i) {
+    own = source[i].contact == index && !source[i].joint && !source[i].pointer;
+  }
+  return own;
+}
+
+/* The rows of the tick before again, at the place that comes next; false: they have to be made. */
 static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *memory,
                        const hapi_tick_facts *facts, hapi_effect_sample *sample)
 {
@@ -425,7 +436,7 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   const hapi_row *was = &solver->rows[kept->first];
   uint32_t count = kept->count;
   uint8_t parts[3];
-  if (kept->first < first || !impulses_finite(was, count)) {
+  if (!rows_stand(rows, kept, c->index) || !impulses_finite(was, count)) {
     return false;
   }
   HAPI_ASSERT(kept->first + count <= rows->capacity);
@@ -460,6 +471,7 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
     return false;
   }
   placed_contact c;
+  c.index = index;
   c.a = hapi_bodies_at(bodies, kept->body_a);
   c.b = hapi_bodies_at(bodies, kept->body_b);
   if (hapi_stay_number(c.a) != kept->stay_a || hapi_stay_number(c.b) != kept->stay_b) {
