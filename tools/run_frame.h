@@ -12,8 +12,8 @@
 typedef struct run_frame_source {
   const rig *rig;
   const hap_scene *scene; /* that of the rig, once more */
-  size_t pointers;   /* of the session, at most VIEW_POINTERS_MAX */
-  hap_trace_row row; /* the newest; used where the rig knows no pointers, of a recording */
+  size_t pointers;        /* of the session, at most VIEW_POINTERS_MAX */
+  hap_trace_row row;      /* the newest; used where the rig knows no pointers, of a recording */
 } run_frame_source;
 
 /* Room for that many bodies. False: there is no memory; run_frame_free all the same. */
