@@ -62,7 +62,7 @@ static const program programs[] = {
      "a device that swings by itself or runs away: when the guard acts, and where it must not"},
     {"peers", bench_peers,
      "the same worlds and hand in engines that are stepped at 1 kHz: time, force; --scene "
-     "WORLD[:N]"},
+     "WORLD[:N][@HZ]"},
     {"poses", bench_poses,
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},

@@ -295,7 +295,7 @@ def check_wish_for_accuracy(program):
 
 def check_near_the_hand(program):
     out = run(program)
-    rows = rows_of(out, r"^[0-9.]+ s  cubes at ([0-9.]+) and ([0-9.]+) m, roles (\d) and (\d), "
+    rows = rows_of(out, r"^[0-9.]+ s  cubes at (-?[0-9.]+) and ([0-9.]+) m, roles (\d) and (\d), "
                         r"(\d) contacts$")
     point(len(rows) == 6 and abs(float(rows[3][1]) - float(rows[3][0]) - 0.05) < 0.001,
           "the cubes go together", out)

@@ -21,6 +21,7 @@ PATH = re.compile(r"`((?:docs|lib(?!/udev)|include|tests|tools|bench|scenes|plug
 NEEDS_MORE = ("spidar", "module:", "replay:", "/", "--play", "--identity", "--record",
               "--tick-share", "--physics-share", "--reconnect", "--shot", "--frames",
               "--view")
+FILE_ENDS = (".xml", ".urdf")
 # What a piece of code may use; a whole program has a main of its own.
 BEFORE = """#include <hapode/hapode.h>
 #include <hapode/ode.h>
@@ -175,7 +176,8 @@ def bad_options(name, path):
 def bad_runs():
     """Commands that need neither hardware, nor a file, nor a person, for a moment."""
     for page, words in commands("hapode-run"):
-        if "--scene" not in words or any(word.startswith(NEEDS_MORE) for word in words):
+        if "--scene" not in words or any(word.startswith(NEEDS_MORE) or word.endswith(FILE_ENDS)
+                                         for word in words):
             continue
         words = [word for i, word in enumerate(words) if word != "--seconds" and
                  (i == 0 or words[i - 1] != "--seconds")]
