@@ -20,7 +20,7 @@ import_body *import_find_body(const import_model *model, const char *name)
 
 void import_pose_join(const hap_pose *a, const hap_pose *b, hap_pose *out)
 {
-  hap_pose joined;
+  hap_pose joined = {{0.0}, {0.0}};
   hapi_pose_point(a->position, a->quat_wxyz, b->position, joined.position);
   hapi_quat_multiply(a->quat_wxyz, b->quat_wxyz, joined.quat_wxyz);
   hapi_quat_normalize(joined.quat_wxyz);
