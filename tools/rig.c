@@ -262,7 +262,7 @@ hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
   memset(out, 0, sizeof *out);
   hap_status status = scene_make(options, out, detail);
   out->devices[0] = options->hardware;
-  if (status < HAP_OK) {
+  if (status < HAP_OK || out->scene == NULL) {
     rig_destroy(out);
     return status;
   }

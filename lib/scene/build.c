@@ -118,12 +118,12 @@ static void mass_given(const hap_body_def *def, dMass *out)
   dMassTranslate(out, c[0], c[1], c[2]); /* as geoms have it: about the frame's origin */
 }
 
-/* Behind those that have numbers, and their mass. */
+/* Behind those that have numbers, and their mass. geoms: NULL where there are none. */
 static hap_status geoms_make(hap_scene *scene, const hap_body_def *def, const hap_geom_def *geoms,
                              dMass *out, hap_detail *detail)
 {
   dMassSetZero(out);
-  for (uint32_t i = 0; i < def->geom_count; ++i) {
+  for (uint32_t i = 0; geoms != NULL && i < def->geom_count; ++i) {
     dMass mass;
     hapi_scene_geom *geom = &scene->geoms[scene->geom_count + i];
     if (hapi_shape_make(scene->space, &geoms[i], geom) < HAP_OK) {
