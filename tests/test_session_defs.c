@@ -79,7 +79,7 @@ TEST(missing_arguments_are_refused)
   s->ode.max_contacts_per_pair = 65;
   CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "max_contacts_per_pair"));
   s->ode.max_contacts_per_pair = 8;
-  s->ode.island_threads = 0;
+  s->ode.island_threads = -1;
   CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "island_threads"));
   s->ode.island_threads = 65;
   CHECK(stage_refused(s, HAP_ERROR_ARGUMENT, "island_threads"));

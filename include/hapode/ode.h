@@ -126,12 +126,13 @@ typedef struct hap_ode_def {
   int32_t max_contacts_per_pair;          /* 1..64, default 8; the loop keeps at most 4 */
   hap_direction_fn friction_direction;    /* may be NULL */
   hap_pointer_surface_fn pointer_surface; /* NULL: everything is felt as the pointers say */
-  /* 1..64, default 1: threads that step islands of the world at once. More than 1: the world has a
-   * pool of ODE's threads while the session runs, and ODE's default at stop, whatever
-   * dWorldSetStepThreadingImplementation had set. They have the priority of the thread that starts
-   * the session. Not used where results repeat bit by bit: in testing simulations, in LOCKSTEP and
-   * while recording. It pays where there are many islands and idle cores; one thread steps one
-   * island. */
+  /* 0..64, default 1: threads that step islands of the world at once. 0: those of the application's
+   * dWorldSetStepThreadingImplementation; without one ODE's default, which two worlds of a process
+   * must not use at the same time. 1: the thread of the physics, in an implementation that is the
+   * world's own. More: a pool of ODE's threads, with the priority of the thread that starts the
+   * session; not where results repeat bit by bit: in testing simulations, in LOCKSTEP and while
+   * recording. It pays where there are many islands and idle cores; one thread steps one island.
+   * But for 0 the world has ODE's default at stop. */
   int32_t island_threads;
   uint32_t reserved;      /* 0 */
   hap_contact_fn contact; /* may be NULL */

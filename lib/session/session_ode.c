@@ -36,7 +36,7 @@ static hap_status ode_check(const hap_ode_def *def, hap_detail *detail)
   const hapi_number_rule rules[] = {
       HAPI_RULE(def, max_contacts_per_pair, 1, 64),
       HAPI_RULE(def, magnet_reach, 0.0, 0.1),
-      HAPI_RULE(def, island_threads, 1, 64),
+      HAPI_RULE(def, island_threads, 0, 64),
   };
   if (def->world == NULL || def->space == NULL) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "%s is NULL",

@@ -16,42 +16,51 @@ bool hapi_islands_begin(hapi_world *world, bool repeats)
 {
   hapi_islands *islands = &world->islands;
   int32_t count = world->ode.island_threads;
-  HAPI_ASSERT(islands->threading == NULL && islands->pool == NULL);
-  if (count <= 1 || repeats) {
+  HAPI_ASSERT(islands->alone == NULL && islands->threading == NULL && islands->pool == NULL);
+  if (count == 0) {
     return true;
   }
-  islands->threading = dThreadingAllocateMultiThreadedImplementation();
-  islands->pool = dThreadingAllocateThreadPool((unsigned)count, 0, dAllocateMaskAll, NULL);
-  if (islands->threading == NULL || islands->pool == NULL) {
+  bool pooled = count > 1 && !repeats;
+  islands->alone = dThreadingAllocateSelfThreadedImplementation();
+  if (pooled) {
+    islands->threading = dThreadingAllocateMultiThreadedImplementation();
+    islands->pool = dThreadingAllocateThreadPool((unsigned)count, 0, dAllocateMaskAll, NULL);
+  }
+  if (islands->alone == NULL || (pooled && (islands->threading == NULL || islands->pool == NULL))) {
     hapi_islands_end(world);
     return false;
   }
-  dThreadingThreadPoolServeMultiThreadedImplementation(islands->pool, islands->threading);
+  if (pooled) {
+    dThreadingThreadPoolServeMultiThreadedImplementation(islands->pool, islands->threading);
+  }
   hapi_islands_go_on(world);
   return true;
 }
 
-void hapi_islands_rest(const hapi_world *world)
+static void islands_set(const hapi_world *world, dThreadingImplementationID threading)
 {
-  if (world->islands.threading != NULL) {
-    dWorldSetStepThreadingImplementation(world->ode.world, NULL, NULL);
-  }
-}
-
-void hapi_islands_go_on(const hapi_world *world)
-{
-  dThreadingImplementationID threading = world->islands.threading;
   if (threading != NULL) {
     dWorldSetStepThreadingImplementation(
         world->ode.world, dThreadingImplementationGetFunctions(threading), threading);
   }
 }
 
+void hapi_islands_rest(const hapi_world *world)
+{
+  islands_set(world, world->islands.alone);
+}
+
+void hapi_islands_go_on(const hapi_world *world)
+{
+  const hapi_islands *islands = &world->islands;
+  islands_set(world, islands->threading != NULL ? islands->threading : islands->alone);
+}
+
 void hapi_islands_end(hapi_world *world)
 {
   hapi_islands *islands = &world->islands;
-  if (!world->gone) {
-    hapi_islands_rest(world);
+  if (!world->gone && islands->alone != NULL) {
+    dWorldSetStepThreadingImplementation(world->ode.world, NULL, NULL);
   }
   if (islands->threading != NULL) {
     dThreadingImplementationShutdownProcessing(islands->threading);
@@ -62,7 +71,10 @@ void hapi_islands_end(hapi_world *world)
   if (islands->threading != NULL) {
     dThreadingFreeImplementation(islands->threading);
   }
-  *islands = (hapi_islands){NULL, NULL};
+  if (islands->alone != NULL) {
+    dThreadingFreeImplementation(islands->alone);
+  }
+  *islands = (hapi_islands){NULL, NULL, NULL};
 }
 
 double hapi_body_mass(dBodyID body)

@@ -41,9 +41,11 @@ typedef struct hapi_world_counts {
   uint64_t contacts_rejected;
 } hapi_world_counts;
 
-/* Threads for the islands of the global step, between begin and end of a session. */
+/* Who steps the islands, between begin and end of a session. ODE's default is one object for all
+ * worlds of the process: two worlds that step at once end the process. */
 typedef struct hapi_islands {
-  dThreadingImplementationID threading; /* NULL: the thread that calls steps all of them */
+  dThreadingImplementationID alone;     /* the thread that calls; NULL: as the application set it */
+  dThreadingImplementationID threading; /* of the pool; NULL: none */
   dThreadingThreadPoolID pool;
 } hapi_islands;
 
