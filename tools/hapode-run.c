@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -15,6 +16,7 @@
 #include "tools/rig.h"
 #include "tools/run_black_box.h"
 #include "tools/run_calibrate.h"
+#include "tools/run_doctor.h"
 #include "tools/run_identify.h"
 #include "tools/run_list.h"
 #include "tools/run_loop.h"
@@ -394,6 +396,17 @@ static void log_show(hap_log_level level, const char *text, void *user)
   }
 }
 
+/* The environment's root is for tests. */
+static int doctor_run(bool json)
+{
+  const char *root = getenv("HAPODE_DOCTOR_ROOT");
+  bool good = run_doctor(stdout, root != NULL ? root : "", json);
+  if (fflush(stdout) != 0 || ferror(stdout) != 0) {
+    return usage_complain(EXIT_FAILED, "the findings cannot be written to stdout");
+  }
+  return good ? EXIT_GOOD : EXIT_FAILED;
+}
+
 int main(int argc, char **argv)
 {
   run_options options;
@@ -413,6 +426,8 @@ int main(int argc, char **argv)
       fputs("hapode-run: bytes are sent to the serial ports of all USB adapters\n", stderr);
       run_list_print(stdout, true);
       break;
+    case RUN_DOCTOR:
+      return doctor_run(options.json);
     case RUN_HELP:
       run_options_help(stdout);
       break;

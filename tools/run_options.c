@@ -426,6 +426,12 @@ static const option table[] = {
      "as --list, and asks the serial port of each USB adapter for boards: bytes are\n"
      "sent there, also to machines that are no haptic devices",
      take_constant, offsetof(run_options, action), RUN_PROBE, 0},
+    {"--doctor", NULL,
+     "what of this machine helps or hinders: kernel, limits, timer, libraries, ports;\n"
+     "a line each, with what to type; 2 s; opens no port; exit 1: there is a problem",
+     take_constant, offsetof(run_options, action), RUN_DOCTOR, 0},
+    {"--json", NULL, "--doctor as JSON (docs/doctor.md)", take_flag, offsetof(run_options, json), 0,
+     0},
     {"--help", NULL, "this text", take_constant, offsetof(run_options, action), RUN_HELP, 0},
     {"--version", NULL, "version of the library", take_constant, offsetof(run_options, action),
      RUN_VERSION, 0},
@@ -728,8 +734,18 @@ hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail
   run_keys_init(&out->window.keys);
   out->check.force = CONFORM_FORCE_DEFAULT;
   out->check.wait_s = 5.0;
-  for (int at = 1; at < argc && status >= HAP_OK && out->action == RUN_SESSION; ++at) {
+  for (int at = 1;
+       at < argc && status >= HAP_OK && (out->action == RUN_SESSION || out->action == RUN_DOCTOR);
+       ++at) {
     status = take_option(argv, &at, out, detail);
+  }
+  if (status >= HAP_OK && out->json && out->action == RUN_SESSION) {
+    return options_fail(detail, "--json: only with --doctor");
+  }
+  for (int at = 1; at < argc && status >= HAP_OK && out->action == RUN_DOCTOR; ++at) {
+    if (strcmp(argv[at], "--doctor") != 0 && strcmp(argv[at], "--json") != 0) {
+      status = options_fail(detail, "--doctor: goes with --json alone, not with %.200s", argv[at]);
+    }
   }
   return status < HAP_OK || out->action != RUN_SESSION ? status : options_check(out, detail);
 }

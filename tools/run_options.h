@@ -16,6 +16,7 @@ typedef enum run_action {
   RUN_SESSION = 0,
   RUN_LIST,
   RUN_PROBE, /* a list for which serial ports are asked */
+  RUN_DOCTOR,
   RUN_HELP,
   RUN_VERSION
 } run_action;
@@ -40,6 +41,7 @@ typedef struct run_window_options {
 
 typedef struct run_options {
   run_action action;
+  bool json; /* of RUN_DOCTOR */
   rig_options rig;
   bool strict; /* of a file: what would be left out is refused */
   bool coupling_given;
