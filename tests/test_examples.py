@@ -45,6 +45,8 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "drawer_with_detents": "docs/body-forces.md",
     "tool_in_hand": "docs/grab.md",
     "one_way_platform": "docs/contacts.md",
+    "identify_a_device": "docs/devices.md",
+    "what_acts": "docs/effects.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -380,6 +382,34 @@ def check_try_device(program):
     out = run(program, "virtual:sine=0.05/0/0,hz=1")
     point("3 degrees of freedom" in out and len(rows_of(out, r"^at (-?[0-9.]+) ")) == 10,
           "it prints where the device is", out)
+
+
+def check_identify_a_device(program):
+    out = run(program)
+    rows = rows_of(out, r"^(before|as measured): ([0-9.]+) kg, ([0-9.]+) N s/m, ([0-9.]+) N$")
+    heard = re.match(r"last told at (\d+) %\n", out)
+    point(heard is not None and 90 <= int(heard.group(1)) <= 100, "it says how far it is", out)
+    point([row[0] for row in rows] == ["before", "as measured"] and float(rows[0][1]) == 0.0,
+          "the device knows nothing of itself", out)
+    point(len(rows) == 2 and all(abs(float(found) - true) <= 0.02 * true for found, true in
+                                 zip(rows[1][1:], (0.3, 1.0, 0.2))),
+          "and has the figures of the true one then", out)
+
+
+def check_what_acts(program):
+    out = run(program)
+    rows = rows_of(out, r"^  (\w+) +(auto|off|on) +(off|on|partly on): (.+) \(.+\)$")
+    states = [{row[0]: row[1:] for row in part} for part in (rows[:len(rows) // 2],
+                                                             rows[len(rows) // 2:])]
+    point(re.match(r"hapode \d+\.\d+\.\d+\n", out) is not None, "it says its version", out)
+    point(len(rows) == 28 and len(states[0]) == 14, "it lists all effects twice", out)
+    point(states[0]["contacts"] == ("auto", "on", "the scene calls for it") and
+          states[0]["gyro"][:2] == ("auto", "off"), "as the scene needs it", out)
+    point(states[1]["gyro"] == ("on", "on", "asked for") and
+          {n: s for n, s in states[1].items() if n != "gyro"} ==
+          {n: s for n, s in states[0].items() if n != "gyro"}, "a wish changes one", out)
+    point(len(rows_of(out, r"^cross=on in model contact: .*use model accelerance$")) == 1,
+          "what cannot be is told with a remedy", out)
 
 
 def shown(page, name):
