@@ -47,6 +47,9 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "one_way_platform": "docs/contacts.md",
     "identify_a_device": "docs/devices.md",
     "what_acts": "docs/effects.md",
+    "after_a_fault": "docs/faults.md",
+    "memory_and_log": "docs/faults.md",
+    "plot_a_trace": "docs/programs.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -410,6 +413,45 @@ def check_what_acts(program):
           {n: s for n, s in states[0].items() if n != "gyro"}, "a wish changes one", out)
     point(len(rows_of(out, r"^cross=on in model contact: .*use model accelerance$")) == 1,
           "what cannot be is told with a remedy", out)
+
+
+def check_after_a_fault(program):
+    out = run(program)
+    rows = rows_of(out, r"^(HAP_\w+), (-?[0-9.]+) N$")
+    force = [float(row[1]) for row in rows]
+    point([row[0] for row in rows] == ["HAP_OK", "HAP_FAULTED", "HAP_OK", "HAP_FAULTED"],
+          "the cable comes out and in, then Ctrl-C", out)
+    point(len(force) == 4 and force[0] < -5.0 and abs(force[2] - force[0]) < 0.1 and
+          force[1] == force[3] == 0.0, "a fault takes the force away, a reset gives it back", out)
+    point(out.count("  fault\n") == 2 and "could not be read" in out and
+          "hap_emergency_zero was called" in out, "it says what happened", out)
+    kept = rows_of(out, r"^  256 ticks kept, the last but one with (-?[0-9.]+) N, the last with "
+                        r"(-?[0-9.]+) N$")
+    point(len(kept) == 2 and all(float(was) < -5.0 and float(last) == 0.0
+                                 for was, last in kept), "the black box has the last ticks", out)
+
+
+def check_memory_and_log(program):
+    out = run(program)
+    said = re.search(r"^(\d+) blocks asked for before, (\d+) in 500 ticks$", out, re.M)
+    point(said is not None and int(said.group(1)) > 20 and int(said.group(2)) == 0,
+          "a running loop asks for no memory", out)
+    said = re.search(r"^(\d+) lines logged, (\d+) blocks left$", out, re.M)
+    point(said is not None and int(said.group(1)) > 10 and int(said.group(2)) == 0,
+          "all memory is given back", out)
+    point("error: hap_session_destroy was called in a callback" in out, "a mistake is logged", out)
+
+
+def check_plot_a_trace(program):
+    out = run(program)
+    rows = [[float(x) for x in line.split(",")] for line in out.splitlines()[1:]]
+    point(out.startswith("t_s,hand_mm,cube_mm,force_n\n") and len(rows) == 600,
+          "a row for each tick", f"{len(rows)} rows")
+    point(all(abs(b[0] - a[0] - 0.001) < 1e-6 for a, b in zip(rows, rows[1:])), "none is missing")
+    pushed = 1e-3 * sum(-row[3] for row in rows)  # N s
+    speed = rows[-1][2] - rows[-2][2]  # mm a ms are m/s
+    point(pushed > 0.05 and abs(pushed - 0.2 * speed) < 0.01 * pushed,
+          "the cube has the momentum that the hand gave", f"{pushed} N s, {speed} m/s")
 
 
 def shown(page, name):
