@@ -47,6 +47,8 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "one_way_platform": "docs/contacts.md",
     "identify_a_device": "docs/devices.md",
     "what_acts": "docs/effects.md",
+    "compare_integrations": "docs/decisions/contact-spring.md",
+    "scene_of_ones_own": "docs/scene.md",
     "after_a_fault": "docs/faults.md",
     "memory_and_log": "docs/faults.md",
     "plot_a_trace": "docs/programs.md",
@@ -452,6 +454,36 @@ def check_plot_a_trace(program):
     speed = rows[-1][2] - rows[-2][2]  # mm a ms are m/s
     point(pushed > 0.05 and abs(pushed - 0.2 * speed) < 0.01 * pushed,
           "the cube has the momentum that the hand gave", f"{pushed} N s, {speed} m/s")
+
+
+def check_compare_integrations(program):
+    out = run(program)
+    rows = rows_of(out, r"^ *(\d+) N/m, (\w+) *: at most ([0-9.]+) N, the ball leaves at "
+                        r"([0-9.]+) m/s$")
+    speed = {(int(row[0]), row[1]): float(row[3]) for row in rows}
+    force = {(int(row[0]), row[1]): float(row[2]) for row in rows}
+    point(len(speed) == 8, "four rules and two springs", out)
+    # Half of an oscillation: v sqrt(k m), and twice the hand's speed.
+    point(all(abs(force[2000, rule] - 0.1 * (2000 * 0.01) ** 0.5) < 0.02 and
+              abs(speed[2000, rule] - 0.2) < 0.002 for rule in ("explicit", "midpoint", "auto")),
+          "on a soft spring energy is kept", out)
+    point(speed[45000, "explicit"] > 0.4 and speed[45000, "midpoint"] < 0.2,
+          "on a stiff one the explicit rule makes some", out)
+    point(speed[45000, "auto"] == speed[45000, "implicit"] < speed[2000, "implicit"] < 0.2,
+          "implicit damps, and is what the library takes there", out)
+
+
+def check_scene_of_ones_own(program):
+    out = run(program)
+    rows = rows_of(out, r"^(as made|let pass): ([0-9.]+) ([0-9.]+) ([0-9.]+) ([0-9.]+) m$")
+    height = [[float(x) for x in row[1:]] for row in rows]
+    point("slide: one cube of 1 kg" in out and len(out.splitlines()) > 20, "it lists scenes", out)
+    # 0.2 s of fall, and the last step may be 1/60 s old
+    least, most = (0.2 - 0.81 * t * t for t in (0.217, 0.166))
+    point(len(rows) == 2 and all(least < h[1] < most for h in height), "they fall as on the moon",
+          out)
+    point(len(rows) == 2 and abs(height[0][3] - 0.15) < 0.001 and abs(height[1][3] - 0.05) < 0.001,
+          "on each other, and through each other", out)
 
 
 def shown(page, name):
