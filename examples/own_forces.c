@@ -51,6 +51,8 @@ int main(void)
     hap_session_detail(session, &why);
     return fprintf(stderr, "%s\n", why.text), 1;
   }
+  printf("a %s to the rail, %s along it\n", hap_force_kind_name((hap_force_kind)rail.kind),
+         hap_force_kind_name((hap_force_kind)clicks.kind));
   for (int frame = 0; frame < 120; ++frame) {
     hap_pointer_state state;
     if (hap_session_advance(session, 17) < HAP_OK) { /* ticks of 1 ms */

@@ -223,8 +223,9 @@ def check_fridge_magnet(program):
 
 
 def check_own_forces(program):
-    rows = rows_of(run(program),
-                   r"^ *([0-9.]+) mm: +(-?[0-9.]+) N along, +(-?[0-9.]+) N to the rail$")
+    out = run(program)
+    rows = rows_of(out, r"^ *([0-9.]+) mm: +(-?[0-9.]+) N along, +(-?[0-9.]+) N to the rail$")
+    point(out.startswith("a spring to the rail, detents along it\n"), "it names them", out)
     along = [abs(float(row[1])) for row in rows]
     point(len(rows) == 20 and max(along[1:9]) <= 0.8 and max(along[12:]) > 0.8,
           "the clicks get harder", str(rows))
