@@ -49,6 +49,8 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "what_acts": "docs/effects.md",
     "compare_integrations": "docs/decisions/contact-spring.md",
     "scene_of_ones_own": "docs/scene.md",
+    "hold_loosely": "docs/grab.md",
+    "check_a_recording": "docs/recording.md",
     "after_a_fault": "docs/faults.md",
     "memory_and_log": "docs/faults.md",
     "plot_a_trace": "docs/programs.md",
@@ -485,6 +487,24 @@ def check_scene_of_ones_own(program):
           out)
     point(len(rows) == 2 and abs(height[0][3] - 0.15) < 0.001 and abs(height[1][3] - 0.05) < 0.001,
           "on each other, and through each other", out)
+
+
+def check_hold_loosely(program):
+    out = run(program)
+    rows = rows_of(out, r"^up to (\d+) N: the box is at (\d+) mm, the hand feels (-[0-9.]+) N$")
+    said = [[float(x) for x in row] for row in rows]
+    point(len(said) == 2 and abs(said[0][2] + 0.5 * 9.81) < 0.05 and said[0][1] > 95.0,
+          "a strong grip lifts the weight", out)
+    point(len(said) == 2 and abs(said[1][2] + 3.0) < 0.05 and said[1][1] == 50.0,
+          "a weak one gives way at its force", out)
+
+
+def check_check_a_recording(program):
+    lines = run(program).splitlines()
+    point(lines[:2] == ["recorded whole", "1 edit of the application in it"],
+          "the file has that something was edited", str(lines))
+    point(re.match(r"differs from tick \d+ .*, first in physics step", lines[-1]) is not None,
+          "the replay differs from there", str(lines))
 
 
 def shown(page, name):
