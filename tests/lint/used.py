@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""used.py ROOT: every function of the public headers is in a test, in a program that shows it, and
+"""used.py ROOT: every function of the public headers is in a test, in a program of examples/, and
 on a page. What is not has a reason here; a reason that is not needed any more is a fault."""
 import re
 import sys
@@ -9,7 +9,6 @@ import sys
 import lint
 
 FUNCTION = re.compile(r"\bHAP_API\b[^;{]*?\b(\w+)\s*\([^;{]*\)\s*;")
-SHOWN = ("examples/", "plugins/skeleton/", "tools/")  # programs, whose source a user may copy
 SAME_EVERYWHERE = re.compile(r"_(init|name|text)$")  # pages name the struct or enum
 
 # Function: why no page has it.
@@ -17,16 +16,9 @@ NO_PAGE = {
     "hap_version": "the header says all",
 }
 
-
-def because(reason, names):
-    return {name: reason for name in names.split()}
-
-
-# Function: why no program shows it.
+# Function: why no program of examples/ shows it.
 NO_PROGRAM = {
-    **because("a name for people, or defaults of a struct", """
-        hap_event_name hap_force_kind_name hap_grab_def_init hap_scene_def_init"""),
-    "hap_scene_let_pass": "for who makes a scene from a file",
+    "hapode_device_module": "a module is no program: plugins/skeleton is the example",
 }
 
 
@@ -43,7 +35,8 @@ def main(root):
     functions = {f for name in files if name.startswith("include/") and name.endswith(".h")
                  for f in FUNCTION.findall(lint.without_comments(lint.read(root, name)))}
     tests = names_in(root, [f for f in files if f.startswith("tests/")])
-    programs = names_in(root, [f for f in files if f.startswith(SHOWN)])
+    programs = {name for f in files if f.startswith("examples/")
+                for name in re.findall(r"\w+", lint.without_comments(lint.read(root, f)))}
     pages = names_in(root, [f for f in lint.project_files(root) if f.endswith(".md") and
                             (f == "README.md" or f.startswith("docs/"))])
     tap.point("there are functions", [] if functions else ["none found"])
