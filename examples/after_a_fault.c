@@ -13,10 +13,10 @@ static hap_status cable_read(void *self, int64_t time_ns, hap_device_input *cons
   return *(int *)self ? hap_device_read(cable_device, time_ns, out) : HAP_ERROR_DEVICE;
 }
 
-static void signal_force_off(int number) /* Ctrl-C: hap_emergency_zero may be called here */
+static void signal_force_off(int number) /* Ctrl-C */
 {
   (void)number;
-  hap_emergency_zero();
+  hap_emergency_zero(); /* made for handlers. NOLINT(bugprone-signal-handler) */
 }
 
 /* What the hand feels after so many ticks; of a fault what happened, and its last ticks. */
