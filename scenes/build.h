@@ -35,8 +35,15 @@ dBodyID scene_add_capsule(scene *s, double radius, double length, double mass,
 /* The plane z = 0. */
 void scene_add_floor(scene *s);
 
+/* The scene's one field of heights, over a square of the given edge, from s->field.heights. at:
+ * where the middle of height 0 is. */
+void scene_add_field(scene *s, double edge, const double at[3]);
+
+/* Of a geom, in place of mu of the parameters. At most SCENE_FRICTIONS_MAX. */
+void scene_set_friction(scene *s, dGeomID geom, double mu);
+
 /* A box that never moves: a geom without a body. */
-void scene_add_block(scene *s, const double edges[3], const double centre[3]);
+dGeomID scene_add_block(scene *s, const double edges[3], const double centre[3]);
 
 /* A hinge between two bodies (b NULL: the world) with the table's friction torque. */
 dJointID scene_add_hinge(scene *s, dBodyID a, dBodyID b, const double anchor[3],
@@ -80,6 +87,9 @@ void scene_build_pendulum(scene *s);
 void scene_build_hinged(scene *s);
 void scene_build_cart(scene *s);
 void scene_build_chain(scene *s);
+
+/* gallery.c */
+void scene_build_gallery(scene *s);
 
 /* tools.c */
 void scene_build_lever(scene *s);

@@ -265,9 +265,22 @@ void scene_destroy(scene *s)
     return;
   }
   dSpaceDestroy(s->space);
+  if (s->field.data != NULL) {
+    dGeomHeightfieldDataDestroy(s->field.data);
+  }
   dWorldDestroy(s->world);
   free(s->bodies);
   free(s);
+}
+
+double scene_friction_of(const scene *s, dGeomID geom)
+{
+  for (size_t i = 0; i < s->friction_count; ++i) {
+    if (s->frictions[i].geom == geom) {
+      return s->frictions[i].mu;
+    }
+  }
+  return s->parameters.mu;
 }
 
 bool scene_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
@@ -280,6 +293,8 @@ bool scene_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
     return false;
   }
   io->mode = dContactApprox1;
-  io->mu = s->parameters.mu;
+  const double mu_a = scene_friction_of(s, a);
+  const double mu_b = scene_friction_of(s, b);
+  io->mu = mu_a == mu_b ? mu_a : sqrt(mu_a * mu_b);
   return true;
 }

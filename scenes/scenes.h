@@ -13,6 +13,8 @@
 #include <hapode/status.h>
 
 #define SCENE_POINTERS_MAX 2
+#define SCENE_FIELD_SIDE 25
+#define SCENE_FRICTIONS_MAX 8
 
 /* The row of the parameter table that a scene is built from. SI units. */
 typedef struct scene_parameters {
@@ -44,6 +46,21 @@ typedef struct scene_parameters {
                    not lost to a gap of micrometres */
 } scene_parameters;
 
+/* A field of heights along z, which never moves. */
+typedef struct scene_field {
+  dGeomID geom; /* NULL: the scene has none */
+  dHeightfieldDataID data;
+  double edge;                                        /* m, of the square that it covers */
+  double heights[SCENE_FIELD_SIDE][SCENE_FIELD_SIDE]; /* m, rows along y, columns along x */
+  double as_ode[SCENE_FIELD_SIDE][SCENE_FIELD_SIDE];  /* the same, rows turned round */
+} scene_field;
+
+/* A geom whose friction is not mu. */
+typedef struct scene_friction {
+  dGeomID geom;
+  double mu;
+} scene_friction;
+
 typedef struct scene {
   scene_parameters parameters; /* as used, N and overrides applied */
   int count;                   /* N as used; 0: the scene has no N */
@@ -51,6 +68,9 @@ typedef struct scene {
   dSpaceID space;
   dBodyID *bodies; /* in the order of interest: the first is what is pushed */
   size_t body_count;
+  scene_field field;
+  scene_friction frictions[SCENE_FRICTIONS_MAX];
+  size_t friction_count;
 } scene;
 
 /* The table. NULL past its end. */
@@ -70,8 +90,11 @@ hap_status scene_create_from(const scene_parameters *parameters, int count, scen
 
 void scene_destroy(scene *s); /* NULL allowed */
 
-/* Shape of hap_surface_fn; user is the scene. False for two static geoms and for bodies that a
- * joint connects. */
+/* Of a geom of the scene. */
+double scene_friction_of(const scene *s, dGeomID geom);
+
+/* Shape of hap_surface_fn; user is the scene. Friction of a pair is the geometric mean. False for
+ * two static geoms and for bodies that a joint connects. */
 bool scene_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io);
 
 #endif

@@ -9,6 +9,6 @@ static const char *const names[] = {
     "fig5",          "fig6",      "fig7",  "slide",   "row10", "stack",    "wedge",  "door",
     "lightstand",    "pile",      "tower", "topple",  "edge",  "hit",      "roll",   "roll_capsule",
     "roll_cylinder", "clump8",    "field", "spheres", "hold",  "pendulum", "hinged", "cart",
-    "chain",         "telescope", "grasp", "lever",   "peg"};
+    "chain",         "telescope", "grasp", "lever",   "peg",   "gallery"};
 
 #endif

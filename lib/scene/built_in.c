@@ -55,6 +55,22 @@ static void shape_read(dGeomID geom, hapi_scene_geom *out)
   }
 }
 
+/* False: no memory. */
+static bool field_read(const scene_field *field, hapi_scene_geom *out)
+{
+  hap_geom_def def;
+  hap_geom_def_init(&def, sizeof def);
+  def.edges[0] = field->edge;
+  def.edges[1] = field->edge;
+  def.columns = SCENE_FIELD_SIDE;
+  def.rows = SCENE_FIELD_SIDE;
+  def.heights = field->heights[0];
+  out->shape = HAP_SHAPE_FIELD;
+  out->edges[0] = field->edge;
+  out->edges[1] = field->edge;
+  return hapi_field_triangles(&def, out);
+}
+
 /* The frame whose z is the plane's normal, at its point nearest to the origin. */
 static void plane_frame(dGeomID plane, hap_pose *out)
 {
@@ -69,21 +85,33 @@ static void plane_frame(dGeomID plane, hap_pose *out)
   memcpy(out->quat_wxyz, q, sizeof q);
 }
 
-static void geom_read(const hap_scene *of, dGeomID geom, hapi_scene_geom *out)
+/* False: no memory. */
+static bool geom_read(const hap_scene *of, dGeomID geom, hapi_scene_geom *out)
 {
   static const hap_pose identity = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
   *out = (hapi_scene_geom){.geom = geom, .pose = identity};
   out->body = hap_scene_find_body(of, dGeomGetBody(geom));
-  out->friction = of->built_in->parameters.mu;
-  shape_read(geom, out);
+  out->friction = scene_friction_of(of->built_in, geom);
+  bool read = true;
+  if (dGeomGetClass(geom) == dHeightfieldClass) {
+    read = field_read(&of->built_in->field, out);
+  } else {
+    shape_read(geom, out);
+  }
   if (out->shape == HAP_SHAPE_PLANE) {
     plane_frame(geom, &out->pose);
-  } else if (out->body == HAP_SCENE_WORLD) {
+  } else if (out->body != HAP_SCENE_WORLD) {
+    memcpy(out->pose.position, dGeomGetOffsetPosition(geom), sizeof out->pose.position);
+    dGeomGetOffsetQuaternion(geom, out->pose.quat_wxyz);
+  } else {
     memcpy(out->pose.position, dGeomGetPosition(geom), sizeof out->pose.position);
-    dGeomGetQuaternion(geom, out->pose.quat_wxyz);
+    if (out->shape != HAP_SHAPE_FIELD) { /* it lies level */
+      dGeomGetQuaternion(geom, out->pose.quat_wxyz);
+    }
   }
   uint32_t colour = out->body == HAP_SCENE_WORLD ? COLOURS - 1 : out->body % (COLOURS - 1);
   memcpy(out->colour, colours[colour], sizeof out->colour);
+  return read;
 }
 
 static hap_joint_kind kind_of(dJointID joint)
@@ -152,9 +180,11 @@ static hap_status world_read(hap_scene *of)
   }
   for (uint32_t i = 0; i < geoms; ++i) { /* a space lists the newest first */
     dGeomID geom = dSpaceGetGeom(built->space, (int)(geoms - 1 - i));
-    geom_read(of, geom, &of->geoms[i]);
-    dGeomSetData(geom, (void *)(uintptr_t)(i + 1));
     of->geom_count = i + 1;
+    if (!geom_read(of, geom, &of->geoms[i])) {
+      return HAP_ERROR_MEMORY;
+    }
+    dGeomSetData(geom, (void *)(uintptr_t)(i + 1));
   }
   return joints_read(of);
 }

@@ -94,6 +94,8 @@ bool hapi_scene_passes(const hap_scene *scene, dBodyID a, dBodyID b);
 
 /* shapes.c */
 hap_status hapi_shape_check(const hap_geom_def *def, bool of_body, hap_detail *detail);
+/* Vertices and triangles of a field as ODE has them. False: no memory. */
+bool hapi_field_triangles(const hap_geom_def *def, hapi_scene_geom *out);
 /* ODE's geom of a def that was checked, in no body. HAP_ERROR_MEMORY. */
 hap_status hapi_shape_make(dSpaceID space, const hap_geom_def *def, hapi_scene_geom *out);
 /* Of the geom where it is in its body's frame. False: it has no volume. */

@@ -127,7 +127,7 @@ static dGeomID mesh_make(dSpaceID space, const hap_geom_def *def, hapi_scene_geo
 
 /* The triangles that ODE has of a field: each cell is cut from its lower left to its upper right
  * corner, seen from above. */
-static bool field_triangles(const hap_geom_def *def, hapi_scene_geom *out)
+bool hapi_field_triangles(const hap_geom_def *def, hapi_scene_geom *out)
 {
   uint32_t across = def->columns;
   out->vertex_count = across * def->rows;
@@ -162,7 +162,7 @@ static dGeomID field_make(dSpaceID space, const hap_geom_def *def, hapi_scene_ge
   double low = def->heights[0];
   double high = def->heights[0];
   out->heights = hapi_alloc_array(count, sizeof *out->heights);
-  if (out->heights == NULL || !field_triangles(def, out)) {
+  if (out->heights == NULL || !hapi_field_triangles(def, out)) {
     return NULL;
   }
   for (uint32_t row = 0; row < def->rows; ++row) {
