@@ -458,21 +458,41 @@ TEST(a_way_of_some_ms_comes_in_as_fast_at_every_rate)
   CHECK_NEAR(hand_x(), 0.1626, 1e-9);
 }
 
-/* A device with a position every 4 ms, at 10 kHz. For some ticks from that one on it tells what is
- * off by x. Returns the farthest from the right way that was felt. */
-static double hand_lie(int from, int ticks, double x, double *out_pace)
+/* A device that tells a position every so many ticks. For some ticks, from that one on, it tells
+ * what is off. */
+typedef struct told_lie {
+  int per_ms; /* ticks */
+  int every;  /* ticks, of one position */
+  int from;   /* tick, 0: when a position is due */
+  int ticks;
+  double x; /* m, off */
+} told_lie;
+
+/* What came of it. */
+typedef struct lie_felt {
+  double farthest; /* m, from the right way */
+  double pace;     /* s, that the device is taken to have */
+  int velocities;  /* ticks in which the lie was a pose for a velocity */
+} lie_felt;
+
+static lie_felt hand_lie(const told_lie *lie)
 {
-  double farthest = 0.0;
+  const double gap = 1e-3 * lie->every / lie->per_ms;
+  const int begin = 50 * lie->every;
+  lie_felt felt = {0.0};
   hand_begin();
-  for (int i = 0; i < 4000; ++i) {
-    double right_x = 2e-6 * (i - i % 40);
-    int at = i - 2000;
-    (void)hand_tell(right_x + (at >= from && at < from + ticks ? x : 0.0), MS / 10);
-    farthest = i >= 2000 ? fmax(farthest, fabs(hand_x() - right_x)) : 0.0;
-    *out_pace = hapi_input_gap(&hand, 1e-4);
-    CHECK(i < 400 || fabs(*out_pace - 4e-3) < 1.1e-3);
+  for (int i = 0; i < 2 * begin; ++i) {
+    double right_x = 0.02e-3 * (i - i % lie->every) / lie->per_ms;
+    int at = i - begin;
+    bool lies = at >= lie->from && at < lie->from + lie->ticks;
+    (void)hand_tell(right_x + (lies ? lie->x : 0.0), MS / lie->per_ms);
+    felt.farthest = i >= begin ? fmax(felt.farthest, fabs(hand_x() - right_x)) : 0.0;
+    felt.pace = hapi_input_gap(&hand, 1e-3 / lie->per_ms);
+    felt.velocities +=
+        fabs(hapi_input_told(&hand)->position[0] - right_x) > 0.5 * fabs(lie->x) ? 1 : 0;
+    CHECK(i < begin / 5 || fabs(felt.pace - gap) < 0.3 * gap);
   }
-  return farthest;
+  return felt;
 }
 
 /* Wherever it comes between two positions: it is passed over, or the right one comes back after as
@@ -481,17 +501,52 @@ static double hand_lie(int from, int ticks, double x, double *out_pace)
 TEST(what_a_seldom_device_tells_too_soon_is_passed_over)
 {
   static const double lies[] = {5e-4, -5e-4, 1e-3, -1e-3, 2e-3, 0.011};
-  for (int lie = 0; lie < 6; ++lie) {
-    for (int from = -20; from < 40; ++from) {
-      for (int ticks = 1; ticks <= 3; ++ticks) {
-        double pace;
-        double felt = hand_lie(from, ticks, lies[lie], &pace);
-        CHECK_SAY(felt <= 0.8e-4 + 0.5e-4 * (2 * ticks + 1), "%g m for %d ticks from %d: %g m",
-                  lies[lie], ticks, from, felt);
-        CHECK_NEAR(pace, 4e-3, 1e-12);
+  for (int i = 0; i < 6; ++i) {
+    told_lie lie = {.per_ms = 10, .every = 40, .x = lies[i]};
+    for (lie.from = -20; lie.from < 40; ++lie.from) {
+      for (lie.ticks = 1; lie.ticks <= 3; ++lie.ticks) {
+        lie_felt felt = hand_lie(&lie);
+        CHECK_SAY(felt.farthest <= 0.8e-4 + 0.5e-4 * (2 * lie.ticks + 1),
+                  "%g m for %d ticks from %d: %g m", lie.x, lie.ticks, lie.from, felt.farthest);
+        CHECK_NEAR(felt.pace, 4e-3, 1e-12);
         CHECK(hand.belief.loss == 0.0);
       }
     }
+  }
+}
+
+/* At 1 kHz, a position every 4 ms: one that is told for a tick, right after another one, is not
+ * felt at all, nor is it taken for the pace of the device. */
+TEST(a_vote_needs_no_more_than_four_ticks)
+{
+  static const double lies[] = {2e-4, -5e-4, 1e-3, 0.011};
+  for (int i = 0; i < 4; ++i) {
+    const told_lie lie = {.per_ms = 1, .every = 4, .from = 1, .ticks = 1, .x = lies[i]};
+    lie_felt felt = hand_lie(&lie);
+    CHECK_SAY(felt.farthest < 1e-4 && felt.velocities == 0, "%g m: %g m, %d velocities", lie.x,
+              felt.farthest, felt.velocities);
+    CHECK_NEAR(felt.pace, 4e-3, 1e-12);
+  }
+}
+
+/* At 10 kHz, every 2 ms: what is told for 0.3 ms makes no velocity, wherever it comes. What stays
+ * makes one in less than half of the time to the next one. */
+TEST(a_velocity_is_made_of_what_stays)
+{
+  static const double lies[] = {1e-4, -2e-4, 4e-4}; /* what a hand might do */
+  for (int i = 0; i < 3; ++i) {
+    told_lie lie = {.per_ms = 10, .every = 20, .ticks = 3, .x = lies[i]};
+    for (lie.from = -10; lie.from < 20; ++lie.from) {
+      lie_felt felt = hand_lie(&lie);
+      CHECK_SAY(felt.velocities == 0, "%g m from %d: %d", lie.x, lie.from, felt.velocities);
+    }
+  }
+  hand_begin();
+  for (int i = 0; i < 2000; ++i) {
+    double x = 0.1e-4 * (i - i % 20);
+    CHECK(hand_tell(x, MS / 10));
+    bool late = i % 20 >= 8;
+    CHECK_SAY(i < 200 || !late || hapi_input_told(&hand)->position[0] == x, "tick %d", i);
   }
 }
 

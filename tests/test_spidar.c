@@ -434,6 +434,18 @@ static void die_with_force(int number)
   CHECK(emulated_await(&machine, true));
 }
 
+/* The watchdog of the library takes the force off in 50 ms. Who is not asked gets a guard that is
+ * slower by far, so that it leaves a living program alone, and that nobody has to wait for. */
+TEST(without_a_stall_that_is_set_the_guard_waits_for_less_than_a_second)
+{
+  hands h;
+  hap_detail detail = {""};
+  REQUIRE(open_device(&h, "", &detail));
+  double stall = ((const hapi_spidar_device *)h.self)->settings.stall;
+  CHECK_SAY(stall >= 5.0 * 0.05 && stall <= 1.0, "%g s", stall);
+  hap_device_close(h.device);
+}
+
 /* Ends with its force on, and the first zeros of the guard lose a byte. */
 TEST(a_zero_that_loses_a_byte_is_sent_again)
 {
