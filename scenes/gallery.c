@@ -126,7 +126,9 @@ static void gallery_add_drawer(scene *s)
   dJointSetSliderParam(rail, dParamLoStop, -3 * pitch);
   dJointSetSliderParam(rail, dParamHiStop, 0);
   const double rise = sqrt((ball + ridge) * (ball + ridge) - pitch * pitch / 4);
-  scene_add_sphere(s, ball, 0.2, (const double[3]){x, y, rise - s->parameters.layer});
+  const dBodyID detent =
+      scene_add_sphere(s, ball, 0.2, (const double[3]){x, y, rise - s->parameters.layer});
+  scene_set_friction(s, dBodyGetFirstGeom(detent), 0.1); /* more jams between wall and ridge */
   for (int i = 0; i < RIDGES; ++i) {
     dMatrix3 rotation;
     const dGeomID bar = dCreateCapsule(s->space, ridge, 2 * (ball + lane));
