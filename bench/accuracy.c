@@ -16,6 +16,7 @@
 #include "bench/accuracy.h"
 #include "bench/bare.h"
 #include "bench/cycles.h"
+#include "bench/progress.h"
 #include "tools/plot.h"
 
 #define ACCURACY_LABEL_MAX 80
@@ -819,7 +820,6 @@ static hap_status accuracy_sweep(bench *b, const accuracy_plan *plan, const accu
  * goes into the file at once; a pipe says so to the parent, which shows how far it is. */
 
 #define LOOK_MS 200
-#define LINE_EVERY_S 30.0 /* where stderr is no terminal */
 
 /* From a process to its parent; shorter than PIPE_BUF, so that it arrives in one piece. */
 typedef struct news {
@@ -827,48 +827,6 @@ typedef struct news {
   double cost;       /* of the row that is finished */
   hap_detail detail;
 } news;
-
-typedef struct progress {
-  bool terminal;
-  size_t rows;
-  size_t finished;
-  double cost; /* of what was to be done in this run */
-  double done;
-  double began;  /* s */
-  double spoken; /* s, of the newest line */
-} progress;
-
-/* ---- how far ---- */
-
-static double now_s(void)
-{
-  struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static void progress_show(progress *p)
-{
-  double now = now_s();
-  if (p->finished == p->rows || (!p->terminal && now - p->spoken < LINE_EVERY_S)) {
-    return;
-  }
-  p->spoken = now;
-  fprintf(stderr, "%saccuracy: %zu of %zu rows", p->terminal ? "\r" : "", p->finished, p->rows);
-  if (p->done > 0.0) {
-    double left = (now - p->began) * (p->cost - p->done) / p->done;
-    bool hours = left >= 5400.0;
-    bool seconds = left < 90.0;
-    fprintf(stderr, ", about %.*f %s left", hours,
-            left / (hours     ? 3600.0
-                    : seconds ? 1.0
-                              : 60.0),
-            hours     ? "h"
-            : seconds ? "s"
-                      : "min");
-  }
-  fputs(p->terminal ? "\033[K" : "\n", stderr);
-}
 
 /* ---- in a process of its own ---- */
 
@@ -921,30 +879,31 @@ static bool is_due(const accuracy_work *work, size_t group)
   return false;
 }
 
-static progress count_rows(const accuracy_work *work)
+static void progress_rows(const accuracy_work *work)
 {
-  progress p = {.terminal = isatty(STDERR_FILENO) == 1, .began = now_s()};
-  p.spoken = p.began;
+  size_t rows = 0;
+  size_t finished = 0;
+  double cost = 0.0;
   for (size_t k = 0; k < work->plan->group_count; ++k) {
     const accuracy_group *g = &work->plan->groups[k];
     for (size_t i = g->first; i < g->first + g->count && work->shard_of[k] == work->shard; ++i) {
       bool there = work->have[i].scene[0] != '\0';
-      ++p.rows;
-      p.finished += there;
-      p.cost += there ? 0.0 : accuracy_point_cost(work->plan, g, &work->plan->points[i]);
+      ++rows;
+      finished += there;
+      cost += there ? 0.0 : accuracy_point_cost(work->plan, g, &work->plan->points[i]);
     }
   }
-  return p;
+  progress_begin("accuracy", "rows", rows, cost);
+  progress_add(finished, 0.0);
 }
 
-static void read_news(bench *b, int from, progress *p, hap_status *io)
+static void read_news(bench *b, int from, hap_status *io)
 {
   struct pollfd wait = {.fd = from, .events = POLLIN};
   news n;
   while (poll(&wait, 1, 0) == 1 && read(from, &n, sizeof n) == (ssize_t)sizeof n) {
     if (n.status >= HAP_OK) {
-      ++p->finished;
-      p->done += n.cost;
+      progress_add(1, n.cost);
     } else if (*io >= HAP_OK) {
       *io = n.status;
       b->detail = n.detail;
@@ -976,7 +935,7 @@ static hap_status begin_process(bench *b, const accuracy_work *work, size_t grou
 }
 
 /* Until one has ended. */
-static void wait_for_one(bench *b, int from, progress *p, hap_status *io)
+static void wait_for_one(bench *b, int from, hap_status *io)
 {
   int result = 0;
   struct pollfd wait = {.fd = from, .events = POLLIN};
@@ -984,8 +943,8 @@ static void wait_for_one(bench *b, int from, progress *p, hap_status *io)
   while (child == 0) {
     (void)poll(&wait, 1, LOOK_MS);
     child = waitpid(-1, &result, WNOHANG);
-    read_news(b, from, p, io);
-    progress_show(p);
+    read_news(b, from, io);
+    progress_show();
   }
   if ((!WIFEXITED(result) || WEXITSTATUS(result) != 0) && *io >= HAP_OK) {
     *io = bench_fail(b, HAP_ERROR_SYSTEM, "a scene's process did not end well");
@@ -995,9 +954,9 @@ static void wait_for_one(bench *b, int from, progress *p, hap_status *io)
 /* Of one that fails the others finish what they have begun. */
 static hap_status run_all(bench *b, const accuracy_work *work, const int pipe_ends[2], bool *begun)
 {
-  progress p = count_rows(work);
   size_t running = 0;
   hap_status status = HAP_OK;
+  progress_rows(work);
   for (;;) {
     size_t next = status >= HAP_OK ? next_group(work, begun) : work->plan->group_count;
     if (next < work->plan->group_count && running < work->processes) {
@@ -1005,15 +964,13 @@ static hap_status run_all(bench *b, const accuracy_work *work, const int pipe_en
       begun[next] = true;
       running += status >= HAP_OK;
     } else if (running > 0) {
-      wait_for_one(b, pipe_ends[0], &p, &status);
+      wait_for_one(b, pipe_ends[0], &status);
       --running;
     } else {
       break;
     }
   }
-  if (p.terminal) {
-    fputs("\r\033[K", stderr);
-  }
+  progress_end();
   return status;
 }
 

@@ -13,6 +13,7 @@
 
 #include "base/regular.h"
 #include "bench/bench.h"
+#include "bench/progress.h"
 #include "tools/plot.h"
 
 hap_status bench_fail(bench *b, hap_status status, const char *format, ...)
@@ -75,26 +76,32 @@ double bench_used_seconds(void)
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+/* The line about how far it is makes room. */
+static void line_say(const char *verdict, const char *format, va_list arguments)
+{
+  progress_hide();
+  fputs(verdict, stdout);
+  vprintf(format, arguments);
+  putchar('\n');
+  progress_show();
+}
+
 void bench_say(const char *format, ...)
 {
   va_list arguments;
   va_start(arguments, format);
-  vprintf(format, arguments);
+  line_say("", format, arguments);
   va_end(arguments);
-  putchar('\n');
 }
 
 void bench_check(bench *b, bool good, const char *format, ...)
 {
   va_list arguments;
   b->off += b->verify && !good;
-  if (b->verify) {
-    fputs(good ? "ok   " : "off  ", stdout);
-  }
+  const char *verdict = good ? "ok   " : "off  ";
   va_start(arguments, format);
-  vprintf(format, arguments);
+  line_say(b->verify ? verdict : "", format, arguments);
   va_end(arguments);
-  putchar('\n');
 }
 
 void bench_skip(const bench *b, const char *format, ...)
@@ -103,11 +110,9 @@ void bench_skip(const bench *b, const char *format, ...)
   if (!b->verify) {
     return;
   }
-  fputs("skip ", stdout);
   va_start(arguments, format);
-  vprintf(format, arguments);
+  line_say("skip ", format, arguments);
   va_end(arguments);
-  putchar('\n');
 }
 
 static int by_value(const void *a, const void *b)

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "bench/faults.h"
+#include "bench/progress.h"
 
 #define REFERENCE_HZ 2000.0
 
@@ -355,12 +356,19 @@ hap_status bench_faults(bench *b)
   }
   hap_status status = csv != NULL && (b->scene == NULL || trace != NULL) ? HAP_OK : HAP_ERROR_IO;
   const faults_scene *scene;
+  size_t scenes = b->scene != NULL;
+  while (b->scene == NULL && faults_scene_at(scenes) != NULL) {
+    ++scenes;
+  }
+  progress_begin("faults", "scenes", scenes, (double)scenes);
   for (size_t i = 0; (scene = faults_scene_at(i)) != NULL && status >= HAP_OK; ++i) {
     if (b->scene == NULL || strcmp(b->scene, scene->name) == 0) {
       found = true;
       status = scene_measure(b, scene, csv, trace, &faults);
+      progress_add(1, 1.0);
     }
   }
+  progress_end();
   if (status >= HAP_OK && !found) {
     status = bench_fail(b, HAP_ERROR_ARGUMENT, "there is no scene \"%s\"", b->scene);
   }

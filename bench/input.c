@@ -3,8 +3,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "base/log.h"
 #include "bench/bench.h"
 #include "bench/false_input.h"
+#include "bench/progress.h"
 
 /* hapode-bench input: what the hand feels while its device tells positions that are false for
  * 0.2 s. */
@@ -61,32 +63,92 @@ static int sizes_of(false_input_kind kind)
   return kind == FALSE_ONE_SPIKES ? 4 : kind == FALSE_ALWAYS || kind == FALSE_ALL_ALWAYS ? 3 : 1;
 }
 
+static int seeds_of(const bench *b, int kind)
+{
+  return is_random(kind) && !b->quick ? SEEDS : 1;
+}
+
 /* One kind of fault, as often as chance or the size of a spike makes it another one. */
 static hap_status kind_measure(bench *b, FILE *csv, false_input_def *def, runs *r)
 {
   static const double spikes[] = {0.004, 0.001, 0.002, 0.011};
-  hap_status status = HAP_OK;
+  const int seeds = seeds_of(b, def->kind);
   for (int size = 0; size < (b->quick ? 1 : sizes_of(def->kind)); ++size) {
-    int seeds = is_random(def->kind) && !b->quick ? SEEDS : 1;
     int good = 0;
-    for (int seed = 1; seed <= seeds && status >= HAP_OK; ++seed) {
+    for (int seed = 1; seed <= seeds; ++seed) {
       bool is_good = false;
       def->spike = spikes[size];
       def->seed = (uint32_t)seed;
-      status = case_measure(b, csv, def, r, &is_good);
+      HAPI_TRY(case_measure(b, csv, def, r, &is_good));
+      progress_add(1, def->haptic_hz);
       good += is_good;
     }
     if (seeds > 1) {
       bench_say("     %d of %d seeds are good", good, seeds);
     }
   }
-  return status;
+  return HAP_OK;
+}
+
+/* The device without a fault, and with each. */
+static hap_status device_measure(bench *b, FILE *csv, const false_input_def *with, runs *r)
+{
+  false_input_def def = *with;
+  HAPI_TRY(false_input_measure(&def, &r->right, &b->detail));
+  bench_check(b, r->right.told_s < 0.0 && r->right.seen_s < 0.0,
+              "%s, %s, %g Hz, undisturbed: nothing is seen, nothing is told",
+              false_input_device_name(def.device), def.row ? "row" : "wall", def.haptic_hz);
+  for (int kind = FALSE_NOTHING + 1; kind < FALSE_KINDS; ++kind) {
+    def.kind = (false_input_kind)kind;
+    HAPI_TRY(kind_measure(b, csv, &def, r));
+  }
+  return HAP_OK;
+}
+
+static const double rates[] = {1000.0, 5000.0, 10000.0};
+
+static size_t rates_of(const bench *b, int device)
+{
+  return b->quick || device == FALSE_INPUT_SPIDAR ? 1 : BENCH_COUNT(rates);
+}
+
+/* A case costs as many ticks as its rate says. */
+static void cases_count(const bench *b)
+{
+  size_t each = 0;
+  size_t cases = 0;
+  double cost = 0.0;
+  for (int kind = FALSE_NOTHING + 1; kind < FALSE_KINDS; ++kind) {
+    each += (size_t)(seeds_of(b, kind) * (b->quick ? 1 : sizes_of((false_input_kind)kind)));
+  }
+  for (int device = 0; device < FALSE_INPUT_DEVICES; ++device) {
+    for (size_t rate = 0; rate < rates_of(b, device); ++rate) {
+      cases += 2 * each; /* wall and row */
+      cost += 2.0 * (double)each * rates[rate];
+    }
+  }
+  progress_begin("input", "cases", cases, cost);
+}
+
+static hap_status devices_measure(bench *b, FILE *csv, runs *r)
+{
+  for (int device = 0; device < FALSE_INPUT_DEVICES; ++device) {
+    for (size_t rate = 0; rate < rates_of(b, device); ++rate) {
+      for (int row = 0; row < 2; ++row) {
+        false_input_def def;
+        false_input_init(&def);
+        def.device = (false_input_device)device;
+        def.row = row != 0;
+        def.haptic_hz = rates[rate];
+        HAPI_TRY(device_measure(b, csv, &def, r));
+      }
+    }
+  }
+  return HAP_OK;
 }
 
 hap_status bench_input(bench *b)
 {
-  static const double rates[] = {1000.0, 5000.0, 10000.0};
-  hap_status status = HAP_OK;
   runs *r = malloc(sizeof *r);
   FILE *csv =
       bench_csv_open(b, "input",
@@ -97,29 +159,9 @@ hap_status bench_input(bench *b)
     free(r);
     return bench_csv_close(b, csv, r == NULL ? HAP_ERROR_MEMORY : HAP_ERROR_IO);
   }
-  for (int device = 0; device < FALSE_INPUT_DEVICES && status >= HAP_OK; ++device) {
-    for (size_t rate = 0; rate < (b->quick || device == FALSE_INPUT_SPIDAR ? 1 : 3); ++rate) {
-      for (int row = 0; row < 2; ++row) {
-        for (int kind = 0; kind < FALSE_KINDS && status >= HAP_OK; ++kind) {
-          false_input_def def;
-          false_input_init(&def);
-          def.device = (false_input_device)device;
-          def.row = row != 0;
-          def.haptic_hz = rates[rate];
-          if (kind == FALSE_NOTHING) {
-            status = false_input_measure(&def, &r->right, &b->detail);
-            bench_check(b, r->right.told_s < 0.0 && r->right.seen_s < 0.0,
-                        "%s, %s, %g Hz, undisturbed: nothing is seen, nothing is told",
-                        false_input_device_name(def.device), row != 0 ? "row" : "wall",
-                        def.haptic_hz);
-            continue;
-          }
-          def.kind = (false_input_kind)kind;
-          status = kind_measure(b, csv, &def, r);
-        }
-      }
-    }
-  }
+  cases_count(b);
+  hap_status status = devices_measure(b, csv, r);
+  progress_end();
   free(r);
   return bench_csv_close(b, csv, status);
 }

@@ -6,6 +6,7 @@
 
 #include "base/vec.h"
 #include "bench/late.h"
+#include "bench/progress.h"
 #include "device/device.h"
 #include "plugins/virtual/virtual.h"
 #include "session/session_internal.h"
@@ -294,10 +295,25 @@ typedef struct late_plan {
   int last;
 } late_plan;
 
+#define LATE_BEGIN_EVERY 107
+
+static const late_pulse pulses[] = {{8, 8},   {12, 4}, {15, 5}, {30, 10}, {3, 1},
+                                    {45, 45}, {2, 1},  {5, 3},  {10, 20}, {25, 4}};
+
+/* Before this tick all pulses have begun. */
+static int last_of(const bench *b, const late_plan *plan)
+{
+  return b->quick ? plan->first + 1 : plan->last;
+}
+
+static size_t rows_of(const bench *b, const late_plan *plan)
+{
+  int begins = (last_of(b, plan) - plan->first + LATE_BEGIN_EVERY - 1) / LATE_BEGIN_EVERY;
+  return (BENCH_COUNT(pulses) + 1) * (size_t)begins;
+}
+
 static hap_status late_scene(bench *b, FILE *csv, const late_plan *plan)
 {
-  static const late_pulse pulses[] = {{8, 8},   {12, 4}, {15, 5}, {30, 10}, {3, 1},
-                                      {45, 45}, {2, 1},  {5, 3},  {10, 20}, {25, 4}};
   static late_course course; /* of the run without pulses */
   late_def def = {
       .scene = plan->scene, .device = plan->device, .ticks = plan->ticks, .course = &course};
@@ -308,11 +324,12 @@ static hap_status late_scene(bench *b, FILE *csv, const late_plan *plan)
     bool alone = i < BENCH_COUNT(pulses);
     def.pulses = alone ? &pulses[i] : late_busy;
     def.pulse_count = alone ? 1 : LATE_BUSY;
-    for (int begin = plan->first; begin < (b->quick ? plan->first + 1 : plan->last); begin += 107) {
+    for (int begin = plan->first; begin < last_of(b, plan); begin += LATE_BEGIN_EVERY) {
       def.begin = begin;
       def.end = begin + 1000;
       if (status >= HAP_OK) {
         status = late_row(b, csv, def, &still);
+        progress_add(1, plan->ticks);
       }
     }
   }
@@ -330,9 +347,14 @@ hap_status bench_late(bench *b)
   if (csv == NULL) {
     return bench_csv_close(b, csv, HAP_OK);
   }
+  size_t rows = rows_of(b, &own);
+  size_t more = b->scene == NULL ? rows_of(b, &spidar) : 0;
+  progress_begin("late", "rows", rows + more,
+                 (double)rows * own.ticks + (double)more * spidar.ticks);
   hap_status status = late_scene(b, csv, &own);
   if (status >= HAP_OK && b->scene == NULL) {
     status = late_scene(b, csv, &spidar);
   }
+  progress_end();
   return bench_csv_close(b, csv, status);
 }

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "bench/peers_run.h"
+#include "bench/progress.h"
 
 #define PEERS_COLUMNS                                                           \
   "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode" \
@@ -281,6 +282,12 @@ static void row_report(bench *b, const peers_row *r)
   }
 }
 
+/* What a case takes, roughly: bodies at a rate, and something for the rest. */
+static double case_cost(const peers_case *of)
+{
+  return 10.0 + of->bodies * of->haptic_hz / USUAL_HZ;
+}
+
 static hap_status case_run(peers_bed *bed, FILE *csv, const peers_case *of)
 {
   bench *b = bed->bench;
@@ -315,6 +322,7 @@ static hap_status case_run(peers_bed *bed, FILE *csv, const peers_case *of)
   }
   peers_run_free(&ode_truth);
   peer_world_destroy(&world);
+  progress_add(1, case_cost(of));
   return status;
 }
 
@@ -464,12 +472,35 @@ static void forces_draw(FILE *script, const void *data)
 
 /* ---- the program ---- */
 
+static bool plan_takes(const bench *b, const world_plan *plan, int bodies)
+{
+  return !b->quick || bodies <= plan->quick_most;
+}
+
+static void cases_count(const bench *b)
+{
+  size_t cases = BENCH_COUNT(fast_cases);
+  double cost = 0.0;
+  for (size_t i = 0; i < BENCH_COUNT(fast_cases); ++i) {
+    cost += case_cost(&fast_cases[i]);
+  }
+  for (size_t i = 0; i < BENCH_COUNT(plans); ++i) {
+    for (int n = 0; n < SIZES_MOST && plans[i].sizes[n] > 0; ++n) {
+      if (plan_takes(b, &plans[i], plans[i].sizes[n])) {
+        ++cases;
+        cost += case_cost(&(peers_case){plans[i].name, plans[i].sizes[n], USUAL_HZ});
+      }
+    }
+  }
+  progress_begin("peers", "worlds", cases, cost);
+}
+
 static hap_status plan_run(peers_bed *bed, FILE *csv, const world_plan *plan, double haptic_hz)
 {
   hap_status status = HAP_OK;
   for (int i = 0; i < SIZES_MOST && plan->sizes[i] > 0 && status >= HAP_OK; ++i) {
     peers_case of = {plan->name, plan->sizes[i], haptic_hz};
-    if (!bed->bench->quick || plan->sizes[i] <= plan->quick_most) {
+    if (plan_takes(bed->bench, plan, plan->sizes[i])) {
       status = case_run(bed, csv, &of);
     }
   }
@@ -515,12 +546,14 @@ static hap_status worlds_run(peers_bed *bed, FILE *csv)
   if (bed->bench->scene != NULL) {
     return scene_run(bed, csv, bed->bench->scene);
   }
+  cases_count(bed->bench);
   for (size_t i = 0; i < BENCH_COUNT(plans) && status >= HAP_OK; ++i) {
     status = plan_run(bed, csv, &plans[i], USUAL_HZ);
   }
   for (size_t i = 0; i < BENCH_COUNT(fast_cases) && status >= HAP_OK; ++i) {
     status = case_run(bed, csv, &fast_cases[i]);
   }
+  progress_end();
   return status;
 }
 

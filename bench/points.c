@@ -4,9 +4,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-#define SPEAK_S 60.0
 
 static const point_field *field_find(const point_field *fields, size_t count, const char *key,
                                      size_t length)
@@ -81,17 +78,4 @@ hap_status points_filter(bench *b, const point_field *fields, size_t count, cons
     item += length + (item[length] == ',');
   }
   return HAP_OK;
-}
-
-void points_say_how_far(size_t done, size_t planned, double *io_spoken)
-{
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  double seconds = (double)now.tv_sec;
-  if (*io_spoken == 0.0) {
-    *io_spoken = seconds;
-  } else if (seconds - *io_spoken >= SPEAK_S) {
-    fprintf(stderr, "stability: %zu of %zu points\n", done, planned);
-    *io_spoken = seconds;
-  }
 }

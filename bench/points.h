@@ -19,7 +19,4 @@ typedef struct point_field {
 hap_status points_filter(bench *b, const point_field *fields, size_t count, const char *keys,
                          bool *out_takes);
 
-/* A line of stderr now and then: how far it is. *io_spoken: s, of the newest one; 0 at first. */
-void points_say_how_far(size_t done, size_t planned, double *io_spoken);
-
 #endif

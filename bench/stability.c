@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "bench/points.h"
+#include "bench/progress.h"
 #include "bench/stability.h"
 #include "bench/stability_own.h"
 
@@ -24,7 +25,6 @@ typedef struct stability_table {
   size_t count;
   size_t planned; /* points that --only takes */
   bool planning;  /* they are counted, not measured */
-  double spoken;  /* s, of the newest line about how far it is */
 } stability_table;
 
 /* Whether --only takes the point. */
@@ -201,12 +201,12 @@ static hap_status add_point(bench *b, stability_table *table, const char *name,
     table->planned += takes && table->planning;
     return status;
   }
-  points_say_how_far(table->count, table->planned, &table->spoken);
   status = stability_run(b, point, SECONDS, &row.result);
   if (status >= HAP_OK && point->coupling != HAP_COUPLING_DIRECT) {
     status = row_feel(b, table, &row);
   }
   table->rows[table->count++] = row;
+  progress_add(1, 1.0);
   return status;
 }
 
@@ -425,7 +425,9 @@ static hap_status points_measure(bench *b, stability_table *table)
 /* The map of stiffness, mass and contacts. */
 static hap_status contacts_measure(bench *b, stability_table *table)
 {
+  progress_begin("stability", "points", table->planned, (double)table->planned);
   hap_status status = points_measure(b, table);
+  progress_end();
   status = status >= HAP_OK ? table_write(b, table) : status;
   if (status >= HAP_OK) {
     say_counts(table);

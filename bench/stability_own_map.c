@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "bench/points.h"
+#include "bench/progress.h"
 #include "bench/stability_own.h"
 
 #include "base/log.h"
@@ -43,7 +44,6 @@ typedef struct own_table {
   size_t cut;
   size_t swinging; /* unstable, and not bound to a body */
   double made;     /* J, most of the unstable ones */
-  double spoken;   /* s */
 } own_table;
 
 static const char *guard_word(const own_point *p)
@@ -107,9 +107,9 @@ static hap_status point_measure(bench *b, own_table *table, const own_point *p)
     table->planned += takes;
     return HAP_OK;
   }
-  points_say_how_far(table->count, table->planned, &table->spoken);
   HAPI_TRY(own_run(b, p, OWN_SECONDS, &result));
   ++table->count;
+  progress_add(1, 1.0);
   table->bounded += result.bounded;
   table->stable += result.stable;
   table->refused += result.refused;
@@ -183,7 +183,9 @@ hap_status own_points_measure(bench *b, size_t planned)
                              "field,bound,stiffness,mass,haptic_hz,delay_ticks,quantum,coupling,"
                              "layout,hand,guard,taken,bounded,stable,energy_ratio,made,force,speed,"
                              "fault");
+  progress_begin("stability", "points with own forces", planned, (double)planned);
   hap_status status = table.csv != NULL ? points_measure(b, &table) : HAP_ERROR_IO;
+  progress_end();
   status = bench_csv_close(b, table.csv, status);
   if (status >= HAP_OK) {
     bench_say("own forces, textures, grabs: %zu of %zu points stable, %zu cut, %zu refused",

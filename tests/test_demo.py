@@ -1,16 +1,17 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""tools/run-demo: on a pipe the summary of hapode-run alone; on a terminal also three sentences and a
-picture. Packages and the build are left out; the run is shortened. Arguments: source root,
+"""tools/run-demo: on a pipe the summary of hapode-run alone; on a terminal also three sentences and
+a picture. Packages and the build are left out; the run is shortened. Arguments: source root,
 hapode-run."""
 import os
 import pathlib
-import pty
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+
+import terminal
 
 root = pathlib.Path(sys.argv[1])
 program = pathlib.Path(sys.argv[2]).resolve()
@@ -54,26 +55,8 @@ def without_display():
     return {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
 
 
-def run_on_terminal(command):
-    """What a person at a terminal sees, and the exit code."""
-    child, terminal = pty.fork()
-    if child == 0:
-        os.execvpe(command[0], command, without_display())
-    said = b""
-    while True:
-        try:
-            part = os.read(terminal, 4096)
-        except OSError:  # nobody holds the other side any more
-            part = b""
-        if not part:
-            break
-        said += part
-    _, status = os.waitpid(child, 0)
-    return said.decode(errors="replace").replace("\r\n", "\n"), os.waitstatus_to_exitcode(status)
-
-
 def keys(text):
-    return re.findall(r"^([a-z_0-9]+): ", re.sub(r"\r.*\033\[K", "", text), re.M)
+    return re.findall(r"^([a-z_0-9]+): ", terminal.left(text), re.M)
 
 
 def check_sentences():
@@ -115,7 +98,7 @@ def check_demo(folder):
     point(wrong and f"exit {piped.returncode}: {piped.stdout}{piped.stderr}",
           "on a pipe the summary comes alone")
 
-    said, code = run_on_terminal([demo])
+    said, code = terminal.run([demo], without_display())
     wrong = code != 0 or not set(keys(piped.stdout)) <= set(keys(said))
     wrong = wrong or not re.search(r"^A simulated hand pushed scene row10 for \S+ s:", said, re.M)
     wrong = wrong or "The force was off by" not in said
@@ -126,12 +109,12 @@ def check_demo(folder):
         wrong = wrong or "hapode-run: " not in said
     point(wrong and f"exit {code}: {said}", "on a terminal three sentences and a picture follow")
 
-    said, code = run_on_terminal([demo, "--seconds", "1", "--model", "single"])
+    said, code = terminal.run([demo, "--seconds", "1", "--model", "single"], without_display())
     wrong = code != 0 or "A simulated hand" in said or "model: single" not in said
     point(wrong and f"exit {code}: {said}", "with arguments it is hapode-run")
 
     short.write_text("#!/bin/sh\necho 'scene: row10'\nexit 3\n")
-    said, code = run_on_terminal([demo])
+    said, code = terminal.run([demo], without_display())
     point((code != 3 or "A simulated hand" in said) and f"exit {code}: {said}",
           "a run that fails is not talked about")
 
