@@ -31,6 +31,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "fridge_magnet": "docs/surfaces.md",
     "push_without_ode": "docs/scene.md",
     "list_a_scene": "docs/scene.md",
+    "feel_by_number": "docs/scene.md",
     "edit_a_scene": "docs/scene.md",
     "change_while_running": "docs/editing.md",
     "wish_for_accuracy": "docs/accuracy.md",
@@ -261,6 +262,14 @@ def check_push_without_ode(program):
     point(len(rows) == 5 and float(rows[0][0]) == 0.0 and float(rows[-1][0]) > 0.1,
           "the mallet is pushed on", str(rows))
     point(len(rows) == 5 and abs(float(rows[-2][1]) + 1.95) < 0.1, "the hand feels its friction",
+          str(rows))
+
+
+def check_feel_by_number(program):
+    rows = dict(rows_of(run(program), r"^(\w+): (-?[0-9.]+) N$"))
+    point(abs(float(rows["foam"]) - 0.8) < 0.01 and abs(float(rows["steel"]) - 8.0) < 0.05,
+          "4 mm deep, each tile feels as its number says", str(rows))
+    point(abs(float(rows["jar"]) + 0.981) < 0.02, "the jar that was listed hangs on the hand",
           str(rows))
 
 

@@ -592,6 +592,62 @@ TEST(step_functions_push)
   scene_end(scene, session);
 }
 
+/* A geom number, and the stiffness that the function gives it. */
+typedef struct felt_geom {
+  uint32_t geom;
+  double stiffness;
+  int calls;
+} felt_geom;
+
+static void surface_soften(void *user, uint32_t geom, hap_pointer_id pointer, hap_surface *io)
+{
+  felt_geom *felt = user;
+  felt->geom = geom;
+  felt->calls += pointer.v != 0;
+  io->stiffness = felt->stiffness;
+}
+
+TEST(a_surface_function_says_how_a_geom_feels)
+{
+  hap_scene *scene = scene_new(0.0);
+  hap_geom_def far = geom_of(HAP_SHAPE_SPHERE);
+  far.pose.position[0] = 5.0;
+  CHECK(hap_scene_add_geom(scene, &far, NULL, NULL) == HAP_OK);
+  uint32_t floor = floor_add(scene);
+  felt_geom felt = {.geom = HAP_SCENE_WORLD, .stiffness = 400.0};
+  CHECK(hap_scene_set_surface(NULL, surface_soften, 0.0, &felt) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_scene_set_surface(scene, surface_soften, 0.2, &felt) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_scene_set_surface(scene, surface_soften, NAN, &felt) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_scene_set_surface(scene, surface_soften, 0.0, &felt) == HAP_OK);
+  hap_session *session = session_over(scene);
+  CHECK(hap_scene_set_surface(scene, NULL, 0.0, NULL) == HAP_ERROR_STATE);
+  hap_pointer_id hand = ball_add(session);
+  CHECK(hap_session_start(session) >= HAP_OK);
+  CHECK_NEAR(force_at(session, hand, 0.3, 0.0, 0.008), 0.8, 1e-3); /* 2 mm deep */
+  CHECK(felt.calls > 0 && felt.geom == floor);
+  scene_end(scene, session);
+}
+
+TEST(a_body_that_is_listed_can_be_held)
+{
+  hap_scene *scene = scene_new(0.0);
+  hap_geom_def box = geom_of(HAP_SHAPE_BOX);
+  uint32_t body = body_add(scene, &box, 1, (double[3]){0.0, 0.0, 0.0});
+  hap_session *session = session_over(scene);
+  hap_pointer_id hand = ball_add(session);
+  hap_pointer_state state;
+  hap_grab_def grab;
+  hap_grab_def_init(&grab, sizeof grab);
+  CHECK(hap_session_start(session) >= HAP_OK);
+  (void)force_at(session, hand, 0.0, 0.0, 0.0);
+  void *id = body_at(scene, body).id;
+  CHECK(hap_scene_find_body(scene, id) == body);
+  CHECK(hap_pointer_attach(session, hand, id, &grab) >= HAP_OK);
+  CHECK(hap_session_advance(session, 100) == HAP_OK);
+  CHECK(hap_pointer_get(session, hand, &state, sizeof state) == HAP_OK && state.held == id);
+  scene_end(scene, session);
+}
+
 static void check_geom(hap_geom_def def, const char *word)
 {
   hap_scene *scene = scene_new(0.0);

@@ -23,6 +23,7 @@
 #include <hapode/session.h>
 #include <hapode/spatial.h>
 #include <hapode/status.h>
+#include <hapode/surface.h>
 
 HAP_BEGIN_DECLS
 
@@ -235,13 +236,14 @@ HAP_API hap_status hap_scene_mesh(const hap_scene *scene, uint32_t geom, double 
 
 /* A body of a scene, as the world has it. Its size goes with the call; it may grow at its end. */
 typedef struct hap_scene_body {
-  hap_pose pose;        /* of its frame in the world */
-  hap_twist twist;      /* of the frame's origin */
-  double mass;          /* kg */
-  double centre[3];     /* m, of mass, in the body's frame */
-  double inertia[3][3]; /* kg m^2, about the centre of mass, axes of the body's frame */
-  uint32_t is_kinematic;
+  hap_pose pose;         /* of its frame in the world */
+  hap_twist twist;       /* of the frame's origin */
+  double mass;           /* kg */
+  double centre[3];      /* m, of mass, in the body's frame */
+  double inertia[3][3];  /* kg m^2, about the centre of mass, axes of the body's frame */
+  uint32_t is_kinematic; /* 1: nothing moves it but its velocity */
   uint32_t reserved;
+  void *id; /* dBodyID, for hap_pointer_attach; to be compared with what touches tell */
 } hap_scene_body;
 
 /* [scene] For drawing: hap_scene_poses. size_of_out: sizeof *out of the caller's build.
@@ -282,8 +284,20 @@ typedef void (*hap_scene_step_fn)(void *user, double step_s);
 HAP_API hap_status hap_scene_set_steps(hap_scene *scene, hap_scene_step_fn before,
                                        hap_scene_step_fn after, void *user);
 
+/* [physics] How a pointer feels a geom of this number: *io comes with what the pointer has of its
+ * own. When it is called, and what it may say: hap_pointer_surface_fn of hapode/ode.h. */
+typedef void (*hap_scene_surface_fn)(void *user, uint32_t geom, hap_pointer_id pointer,
+                                     hap_surface *io);
+
+/* [control] The function that says how geoms feel; set before the session is created. NULL: all
+ * feel as the pointers say. magnet_reach: m, 0..0.1, as in hap_ode_def. HAP_ERROR_STATE: there is a
+ * session already. HAP_ERROR_ARGUMENT, and nothing changes: magnet_reach is out of range. */
+HAP_API hap_status hap_scene_set_surface(hap_scene *scene, hap_scene_surface_fn surface,
+                                         double magnet_reach, void *user);
+
 /* [control] hap_session_create over the scene, with its errors; def NULL: defaults. A scene has one
- * session at a time. */
+ * session at a time. Its first HAP_TRACE_BODIES_MAX bodies go into the trace, in the order of their
+ * numbers. */
 HAP_NODISCARD HAP_API hap_status hap_scene_session(hap_scene *scene, const hap_session_def *def,
                                                    hap_session **out, hap_detail *detail);
 

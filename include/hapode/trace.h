@@ -36,7 +36,7 @@ typedef struct hap_trace_row {
   uint32_t bodies;        /* local bodies */
   uint32_t contacts;      /* contacts that push */
   uint32_t pointer_count; /* places in use: up to the last pointer */
-  uint32_t body_count;    /* traced bodies: hap_session_trace_bodies of hapode/ode.h */
+  uint32_t body_count;    /* traced: hap_session_trace_bodies of ode.h, hap_scene_session */
   hap_trace_pointer pointers[HAP_TRACE_POINTERS_MAX];
   double body_position[HAP_TRACE_BODIES_MAX][3]; /* m: the loop's where the body is local,
                                                     otherwise of the newest physics step */

@@ -87,6 +87,7 @@ hap_status hap_scene_get_body(const hap_scene *scene, uint32_t number, hap_scene
     }
   }
   value.is_kinematic = dBodyIsKinematic(body->body) != 0;
+  value.id = body->body;
   return value_give(&value, sizeof value, out, size_of_out);
 }
 

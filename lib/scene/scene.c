@@ -122,10 +122,49 @@ hap_status hap_scene_set_steps(hap_scene *scene, hap_scene_step_fn before, hap_s
   return HAP_OK;
 }
 
+/* A geom that the scene does not have feels as the pointer says. */
+static void surface_felt(void *user, hap_pointer_id pointer, dGeomID geom, hap_surface *io)
+{
+  hap_scene *scene = user;
+  uintptr_t number = (uintptr_t)dGeomGetData(geom); /* plus one */
+  if (geom_of(scene, geom) != NULL) {
+    scene->surface(scene->surface_user, (uint32_t)(number - 1), pointer, io);
+  }
+}
+
+hap_status hap_scene_set_surface(hap_scene *scene, hap_scene_surface_fn surface,
+                                 double magnet_reach, void *user)
+{
+  if (scene == NULL || !(magnet_reach >= 0.0 && magnet_reach <= 0.1)) {
+    return HAP_ERROR_ARGUMENT;
+  }
+  if (scene->session != NULL) {
+    return hapi_session_fail(scene->session, HAP_ERROR_STATE,
+                             "the surface function is set before the session is created");
+  }
+  scene->surface = surface;
+  scene->magnet_reach = magnet_reach;
+  scene->surface_user = user;
+  return HAP_OK;
+}
+
 static void session_gone(void *arg)
 {
   hap_scene *scene = arg;
   scene->session = NULL;
+}
+
+/* Bodies that were removed have no place. */
+static hap_status first_trace(const hap_scene *scene, hap_session *session)
+{
+  dBodyID bodies[HAP_TRACE_BODIES_MAX];
+  size_t count = 0;
+  for (uint32_t i = 0; i < scene->body_count && count < HAP_TRACE_BODIES_MAX; ++i) {
+    if (scene->bodies[i].body != NULL) {
+      bodies[count++] = scene->bodies[i].body;
+    }
+  }
+  return hap_session_trace_bodies(session, bodies, count);
 }
 
 hap_status hap_scene_session(hap_scene *scene, const hap_session_def *def, hap_session **out,
@@ -141,8 +180,17 @@ hap_status hap_scene_session(hap_scene *scene, const hap_session_def *def, hap_s
   ode.surface = surface_of;
   ode.before_step = scene->before != NULL ? step_before : NULL;
   ode.after_step = scene->after != NULL ? step_after : NULL;
+  ode.pointer_surface = scene->surface != NULL ? surface_felt : NULL;
+  ode.magnet_reach = scene->magnet_reach;
   ode.user = scene;
   HAPI_TRY(hap_session_create(def, &ode, out, detail));
+  hap_status status = first_trace(scene, *out);
+  if (status < HAP_OK) {
+    (void)hap_session_detail(*out, detail);
+    hap_session_destroy(*out);
+    *out = NULL;
+    return status;
+  }
   scene->session = *out;
   (*out)->gone = (hapi_session_gone){session_gone, scene};
   return HAP_OK;

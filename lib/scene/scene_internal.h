@@ -74,6 +74,9 @@ struct hap_scene {
   hap_scene_step_fn before;
   hap_scene_step_fn after;
   void *user;
+  hap_scene_surface_fn surface; /* NULL: geoms feel as the pointers say */
+  double magnet_reach;          /* m */
+  void *surface_user;
 };
 
 /* life.c */
