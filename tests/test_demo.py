@@ -102,6 +102,8 @@ def check_demo(folder):
     wrong = code != 0 or not set(keys(piped.stdout)) <= set(keys(said))
     wrong = wrong or not re.search(r"^A simulated hand pushed scene row10 for \S+ s:", said, re.M)
     wrong = wrong or "The force was off by" not in said
+    wrong = wrong or f"moving picture: {folder / 'build' / 'demo.html'}" not in said
+    wrong = wrong or not (folder / "build" / "demo.html").exists()
     still = folder / "build" / "demo.png"
     if still.exists():
         wrong = wrong or still.read_bytes()[:4] != b"\x89PNG" or f"picture: {still}" not in said

@@ -25,6 +25,14 @@ point() {
 apt_get() { apt-get -y -q -o APT::Sandbox::User=root "$@"; }
 runs() { hapode-run --scene row10 --lockstep --seconds 1; }
 felt() { "$1" | grep 'hand feels'; }
+felt_in_python() {
+  python3 -c 'import hapode
+with hapode.Scene.load("row10") as scene, scene.session(drive="lockstep") as session:
+    hand = session.add_hand()
+    session.start()
+    session.advance(1000)
+    assert hand.state.wrench.force[0] < -1.0'
+}
 by_pkg_config() {
   cc -std=c11 -o /tmp/one /usr/share/doc/hapode/examples/touch_a_cube.c \
     $(pkg-config --cflags --libs hapode) && felt /tmp/one
@@ -46,13 +54,16 @@ completes() {
   bash -c '. /usr/share/bash-completion/completions/hapode-run && complete -p hapode-run'
 }
 rules() { test -s /usr/lib/udev/rules.d/60-hapode-spidar.rules; }
-removes() { apt_get purge libhapode1 libhapode-common libhapode-dev hapode-tools; }
+removes() {
+  apt_get purge libhapode1 libhapode-common libhapode-dev hapode-tools python3-hapode
+}
 nothing_left() { ! find /usr /etc /var/lib/dpkg/info -iname '*hapode*' | grep .; }
 point 'installs' apt_get install --no-install-recommends /debs/*.deb
 point 'hapode-run pushes a row of cubes' runs
 point 'rules of udev' rules
 point 'pages of the manual' pages
 point 'completion' completes
+point 'a session in Python' felt_in_python
 point "the README's program by pkg-config" by_pkg_config
 point "the README's program by CMake" by_cmake /tmp/built 0.2
 point "the README's program by CMake, static" static_by_cmake

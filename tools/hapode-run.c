@@ -200,6 +200,10 @@ static int run_and_report(run_loop *loop, const run_recording *recording)
     code = usage_complain(EXIT_FAILED, detail.text);
   }
   loop->shot = NULL;
+  if (run_html_close(loop->html, &detail) < HAP_OK) {
+    code = usage_complain(EXIT_FAILED, detail.text);
+  }
+  loop->html = NULL;
   if (picture_draw(loop, &detail) < HAP_OK) {
     code = usage_complain(EXIT_FAILED, detail.text);
   }
@@ -272,6 +276,9 @@ static int run_in(const run_options *options, rig *r, const run_recording *recor
                    .pointers = pointers_of(r, recording)};
   run_progress_init(&loop.progress, options->rig.max_force > 0.0 ? options->rig.max_force : 20.0);
   int code = open_shot(options, &loop, &detail);
+  if (code == EXIT_GOOD && run_html_open(options, r, loop.pointers, &loop.html, &detail) < HAP_OK) {
+    code = EXIT_FAILED;
+  }
   if (code == EXIT_GOOD && run_stage_enter(loop.stage, options, r, loop.pointers,
                                            strips_of(options, recording), &detail) < HAP_OK) {
     code = EXIT_FAILED;
@@ -286,6 +293,7 @@ static int run_in(const run_options *options, rig *r, const run_recording *recor
   } else {
     fprintf(stderr, "hapode-run: %s\n", detail.text);
     run_shot_drop(loop.shot);
+    run_html_drop(loop.html);
     (void)close_trace(&loop, &detail);
     (void)close_black_box(&loop, &detail);
   }

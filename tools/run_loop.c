@@ -99,7 +99,7 @@ bool run_loop_stop_wanted(void)
 int32_t run_loop_trace_rows(const run_options *options)
 {
   if (options->trace_path == NULL && options->plot_path == NULL && options->shot.path == NULL &&
-      options->shot.frames == NULL && !options->window.wanted) {
+      options->shot.frames == NULL && options->html_path == NULL && !options->window.wanted) {
     return 0;
   }
   return (int32_t)fmin(fmax(options->rig.def.haptic_hz, ROWS_MIN), ROWS_MAX);
@@ -131,7 +131,7 @@ static void trace_drain(run_loop *loop)
   hap_trace_row rows[ROWS_AT_ONCE];
   size_t count = 0;
   if (loop->trace.file == NULL && loop->picture == NULL && loop->shot == NULL &&
-      loop->stage == NULL) {
+      loop->html == NULL && loop->stage == NULL) {
     return;
   }
   while (hap_session_trace_read(loop->rig->session, rows, ROWS_AT_ONCE, sizeof(hap_trace_row),
@@ -141,6 +141,7 @@ static void trace_drain(run_loop *loop)
     }
     for (size_t i = 0; i < count; ++i) {
       run_shot_add_row(loop->shot, &rows[i]);
+      run_html_add_row(loop->html, &rows[i]);
       run_stage_add_row(loop->stage, &rows[i]);
     }
     write_rows(loop, rows, count);
@@ -207,6 +208,7 @@ static hap_status watch_look(watch *w, double t)
   }
   (void)hap_session_stats(loop->rig->session, &stats, sizeof stats);
   run_shot_look(loop->shot, t);
+  run_html_look(loop->html, t);
   run_coupling_look(loop->coupling, loop->rig);
   if (loop->picture != NULL && t >= w->next_sample) {
     run_picture_add_stats(loop->picture, t, &stats, 1.0 / run_summary_physics_hz(loop->options));

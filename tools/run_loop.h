@@ -6,6 +6,7 @@
 /* Lets a session run for its time and takes the trace out of it on the way. */
 
 #include "tools/run_coupling.h"
+#include "tools/run_html.h"
 #include "tools/run_options.h"
 #include "tools/run_picture.h"
 #include "tools/run_progress.h"
@@ -22,6 +23,7 @@ typedef struct run_loop {
   FILE *black_box;      /* NULL: none wanted */
   run_picture *picture; /* NULL: none wanted */
   run_shot *shot;       /* NULL: none wanted */
+  run_html *html;       /* NULL: none wanted */
   run_stage *stage;     /* of the window; NULL: there is none */
   run_progress progress;
   run_coupling *coupling; /* filled in on the way */

@@ -392,6 +392,8 @@ static const option table[] = {
      take_flag, offsetof(run_options, window.wanted), 0, 0},
     {"--keys", "LIST", "of the window, such as quit=x,scene-next=off, or all=off", take_keys, 0, 0,
      0},
+    {"--html", "FILE", "the run as one page for a browser, which turns and replays it", take_text,
+     offsetof(run_options, html_path), 0, 0},
     {"--shot", "FILE", "picture of the scene as PNG, when the force is strongest; needs no display",
      take_text, offsetof(run_options, shot.path), 0, 0},
     {"--shot-at", "S", "the picture is of this time of the run", take_number,
@@ -469,8 +471,8 @@ static bool beside_play(const option *o)
                                       "--shot",    "--shot-at",
                                       "--frames",  "--shot-size",
                                       "--camera",  "--view",
-                                      "--keys",    "--help",
-                                      "--version"};
+                                      "--keys",    "--html",
+                                      "--help",    "--version"};
   bool found = false;
   for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
     found = found || strcmp(names[i], o->name) == 0;
@@ -615,6 +617,24 @@ static hap_status check_shot(const run_options *o, hap_detail *detail)
                : HAP_OK;
 }
 
+static hap_status check_html(const run_options *o, hap_detail *detail)
+{
+  const char *path = o->html_path;
+  if (path == NULL) {
+    return HAP_OK;
+  }
+  if (texts_same(path, o->trace_path) || texts_same(path, o->plot_path) ||
+      texts_same(path, o->black_box_path) || texts_same(path, o->record_path) ||
+      texts_same(path, o->play_path) || texts_same(path, o->shot.path)) {
+    return options_fail(detail, "--html: the same file as that of another option");
+  }
+  bool alone = o->identify_path != NULL || o->calibrate_path != NULL || o->check.spec != NULL;
+  return alone || o->window.wanted
+             ? options_fail(detail,
+                            "--html: not with --view, --identify, --calibrate or --check-device")
+             : HAP_OK;
+}
+
 static hap_status check_calibrate(const run_options *o, hap_detail *detail)
 {
   if (o->calibrate_path == NULL) {
@@ -712,10 +732,11 @@ static hap_status options_check(run_options *o, hap_detail *detail)
     return options_fail(detail, "--identify: takes exactly one --device, there are %zu",
                         o->rig.device_count);
   }
-  if (check_shot(o, detail) < HAP_OK || check_calibrate(o, detail) < HAP_OK ||
-      check_error(o, detail) < HAP_OK || check_budget(o, detail) < HAP_OK ||
-      check_recording(o, detail) < HAP_OK || join_recording(o, detail) < HAP_OK ||
-      join_coupling(o, detail) < HAP_OK || join_friction(o, detail) < HAP_OK) {
+  if (check_shot(o, detail) < HAP_OK || check_html(o, detail) < HAP_OK ||
+      check_calibrate(o, detail) < HAP_OK || check_error(o, detail) < HAP_OK ||
+      check_budget(o, detail) < HAP_OK || check_recording(o, detail) < HAP_OK ||
+      join_recording(o, detail) < HAP_OK || join_coupling(o, detail) < HAP_OK ||
+      join_friction(o, detail) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
   return run_effects_apply(&o->effects, def->model, &o->rig.expert, &why) < HAP_OK

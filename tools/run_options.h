@@ -53,6 +53,7 @@ typedef struct run_options {
   const char *plot_path;
   const char *black_box_path;
   run_shot_options shot;
+  const char *html_path; /* of --html; NULL: none */
   run_window_options window;
   const char *identify_path;  /* not NULL: identify the device, no session */
   const char *calibrate_path; /* not NULL: calibrate the device, no session */

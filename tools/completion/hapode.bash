@@ -23,7 +23,8 @@ _hapode() {
         --scene) words=$(_hapode_section "$program" scenes) ;;
         --model) words=$(_hapode_section "$program" models) ;;
         --device | --check-device) words=$(_hapode_section "$program" devices) ;;
-        --identity | --identify | --calibrate | --trace | --plot | --shot | --frames | \
+        --identity | --identify | --calibrate | --trace | --plot | --html | --shot | \
+          --frames | \
           --black-box | --record | --play | --play-incomplete)
           mapfile -t COMPREPLY < <(compgen -f -- "$word")
           return ;;
