@@ -30,6 +30,23 @@
 
 #include <hapode/attributes.h>
 
+/* gcc defines a macro, clang has a feature. */
+#if defined(__has_feature)
+#define TAP_HAS_FEATURE(x) __has_feature(x)
+#else
+#define TAP_HAS_FEATURE(x) 0
+#endif
+#if defined(__SANITIZE_THREAD__) || TAP_HAS_FEATURE(thread_sanitizer)
+#define TAP_THREAD_SANITIZER 1
+#else
+#define TAP_THREAD_SANITIZER 0
+#endif
+#if defined(__SANITIZE_ADDRESS__) || TAP_HAS_FEATURE(address_sanitizer)
+#define TAP_ADDRESS_SANITIZER 1
+#else
+#define TAP_ADDRESS_SANITIZER 0
+#endif
+
 typedef struct tap_table {
   const void *rows;
   size_t row_size;

@@ -132,7 +132,7 @@ static const struct {
     {"force_of_last_life", "open_again_holds_no_force"},
     {"leak_file", "nothing_is_left_open"},
     {"leak_thread", "nothing_is_left_open"},
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !TAP_ADDRESS_SANITIZER && !TAP_THREAD_SANITIZER
     {"leak_memory", "nothing_is_left_open"}, /* theirs is not the C library's heap */
 #endif
 };

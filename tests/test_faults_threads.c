@@ -41,10 +41,13 @@ static bool begin_threads(void)
 /* False: not for long. */
 static bool wait_until(bool (*condition)(void))
 {
-  for (int i = 0; i < 20000 && !condition(); ++i) {
+  for (int i = 0; i < 20000; ++i) {
+    if (condition()) {
+      return true;
+    }
     sleep_ms(1);
   }
-  return condition();
+  return false;
 }
 
 static bool hand_presses(void)

@@ -854,8 +854,7 @@ TEST(ten_thousand_cycles_touch_no_new_memory)
   hapi_haptic_stats(haptic, &stats);
   CHECK(stats.loop.ticks == 11000 && stats.loop.contact_ticks > 0 &&
         stats.loop.models_adopted == 1);
-#if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__) /* they touch memory of theirs */
+#if !TAP_ADDRESS_SANITIZER && !TAP_THREAD_SANITIZER /* they touch memory of theirs */
   CHECK(after.ru_minflt == before.ru_minflt);
   CHECK(after.ru_majflt == before.ru_majflt);
 #endif

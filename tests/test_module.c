@@ -320,7 +320,7 @@ TEST(threads_may_load_at_the_same_time)
   atomic_int failures;
   atomic_init(&failures, 0);
   hap_device *kept = NULL;
-#if defined(__SANITIZE_THREAD__)
+#if TAP_THREAD_SANITIZER
   /* It does not know the locks of the system's loader, by which one load comes behind another
    * one. */
   CHECK(hap_device_open(spec_of(module_of("HAPODE_TABLES"), ""), &kept, NULL) == HAP_OK);

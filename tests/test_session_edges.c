@@ -259,6 +259,9 @@ TEST(a_lock_does_not_die_with_its_thread)
 {
   pthread_t thread;
   void *had = NULL;
+#if TAP_THREAD_SANITIZER
+  SKIP("the sanitizer does not see that a robust lock goes on to the next owner");
+#endif
   stage *s = stage_new(HAP_DRIVE_THREADS);
   REQUIRE(stage_create(s) == HAP_OK);
   CHECK(hap_session_start(s->session) >= HAP_OK);

@@ -211,7 +211,7 @@ TEST(force_is_gone_after_each_fault_and_nothing_grows)
          own_faults, grown_kb, warm_kb);
   CHECK(passed >= 3 && warm_kb > 0);
   CHECK(entries_of("/proc/self/fd") == files && entries_of("/proc/self/task") == threads);
-#if !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
+#if !TAP_ADDRESS_SANITIZER && !TAP_THREAD_SANITIZER
   CHECK(grown_kb <= GROWTH_MOST);
 #endif
   stage_end(s);

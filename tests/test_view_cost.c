@@ -16,7 +16,7 @@
 #include "tests/tap.h"
 #include "view/view.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if TAP_ADDRESS_SANITIZER || TAP_THREAD_SANITIZER
 #define OWN_MALLOC 0
 #else
 #define OWN_MALLOC 1
