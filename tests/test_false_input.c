@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <unistd.h>
 
+#include <hapode/device_impl.h>
 #include <hapode/hapode.h>
 #include <hapode/ode.h>
 
@@ -392,6 +393,129 @@ TEST(doubt_adds_up)
     }
     CHECK((hand.belief.loss > 0.0) == (every == 3));
   }
+}
+
+/* Where noise stays within the bound of a hand, what it makes of a spring is taken, to and fro. */
+TEST(what_the_energy_observer_takes_to_and_fro_is_doubt)
+{
+  hand_rest(1, 25 * MS);
+  for (int i = 0; i < 4; ++i) {
+    CHECK((hand.belief.loss >= 1.0) == (i >= 3));
+    CHECK(i != 1 || (hand.belief.loss > 0.3 && hand.belief.loss < 0.4));
+    hand.guard.shakes = true;
+    (void)hand_tell(0.0, MS);
+    hand.guard.shakes = false;
+    (void)hand_tell(0.0, MS);
+  }
+}
+
+typedef struct noisy_device {
+  double z;       /* m, of the hand that presses */
+  double noise;   /* m, either way */
+  uint32_t state; /* of the noise */
+  double force;   /* N, as written */
+} noisy_device;
+
+static hap_status noisy_open(void *context, const char *args, void **self, hap_detail *detail)
+{
+  (void)args, (void)detail;
+  *self = context;
+  return HAP_OK;
+}
+
+static void noisy_describe(void *self, uint32_t effector, hap_device_info *out)
+{
+  (void)self, (void)effector;
+  out->dof = 3, out->max_force = 20.0;
+}
+
+static hap_status noisy_start(void *self)
+{
+  (void)self;
+  return HAP_OK;
+}
+
+static hap_status noisy_read(void *self, int64_t time_ns, hap_device_input *const out[])
+{
+  noisy_device *d = self;
+  double t = 1e-9 * (double)time_ns;
+  d->z = 0.03 - 0.025 * fmin(2.0 * t, 1.0);
+  d->state = d->state * 1664525u + 1013904223u;
+  double share = 2.0 * (d->state >> 8) / 16777216.0 - 1.0;
+  out[0]->pose = (hap_pose){{0.0, 0.0, d->z + (t > 1.0 ? share * d->noise : 0.0)}, {1, 0, 0, 0}};
+  return HAP_OK;
+}
+
+static hap_status noisy_write(void *self, const hap_device_output *const wanted[],
+                              hap_device_output *const reached[])
+{
+  noisy_device *d = self;
+  d->force = wanted[0]->wrench.force[2];
+  reached[0]->wrench = wanted[0]->wrench;
+  return HAP_OK;
+}
+
+static void noisy_off(void *self)
+{
+  ((noisy_device *)self)->force = 0.0;
+}
+
+typedef struct noise_row {
+  const char *name;
+  double noise; /* m */
+  bool faults;
+} noise_row;
+
+static const noise_row noise_rows[] = {
+    {"noise_of_50_um_is_felt_as_it_is", 5e-5, false},
+    {"noise_of_100_um_is_felt_as_it_is", 1e-4, false},
+    {"noise_of_200_um_is_a_fault", 2e-4, true},
+    {"noise_of_400_um_is_a_fault", 4e-4, true},
+    {"noise_of_2_mm_is_a_fault", 2e-3, true},
+};
+
+/* At 5 kHz, 5 mm deep in a wall of 1 kN/m. What noise makes is no more than k times the noise, or
+ * the fault is there. */
+TEST_EACH(noise_rows, const noise_row *row)
+{
+  const hap_device_ops ops = {HAP_DEVICE_ABI,     sizeof ops,  "noisy",        "noise",
+                              HAP_PACING_VIRTUAL, noisy_open,  noisy_describe, noisy_start,
+                              noisy_read,         noisy_write, noisy_off,      noisy_off,
+                              noisy_off};
+  noisy_device device = {.noise = row->noise, .state = 7};
+  hap_detail why = {""};
+  hap_session *session;
+  hap_session_def def;
+  hap_ode_def ode;
+  hap_pointer_def hand_def;
+  hap_pointer_id id;
+  hap_stats stats;
+  hap_session_def_init(&def, sizeof def);
+  hap_ode_def_init(&ode, sizeof ode);
+  hap_pointer_def_init(&hand_def, sizeof hand_def);
+  def.drive = HAP_DRIVE_LOCKSTEP, def.haptic_hz = 5000.0;
+  ode.world = dWorldCreate(), ode.space = dHashSpaceCreate(NULL);
+  dCreatePlane(ode.space, 0, 0, 1, 0);
+  hand_def.radius = 0.01, hand_def.stiffness = 1000.0;
+  REQUIRE_SAY(hap_session_create(&def, &ode, &session, &why) >= HAP_OK &&
+                  hap_device_create(&ops, &device, &hand_def.device, &why) >= HAP_OK &&
+                  hap_pointer_add(session, &hand_def, &id) >= HAP_OK &&
+                  hap_session_start(session) >= HAP_OK,
+              "%s", why.text);
+  CHECK(hap_session_advance(session, 4999) >= HAP_OK);
+  CHECK_NEAR(device.force, 5.0, 0.05);
+  for (int i = 0; i < 10000; ++i) {
+    CHECK(hap_session_advance(session, 1) >= HAP_OK);
+    CHECK(row->faults || fabs(device.force - 5.0) <= 1000.0 * row->noise + 0.05);
+  }
+  CHECK(hap_session_stats(session, &stats, sizeof stats) == HAP_OK);
+  CHECK((stats.faults.fault == HAP_FAULT_DEVICE_INPUT) == row->faults);
+  CHECK(row->faults || stats.faults.fault == HAP_FAULT_NONE);
+  CHECK(!row->faults || device.force == 0.0);
+  hap_session_destroy(session);
+  hap_device_close(hand_def.device);
+  dSpaceDestroy(ode.space);
+  dWorldDestroy(ode.world);
 }
 
 /* Nothing of it is pushed before it is believed. */

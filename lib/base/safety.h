@@ -88,6 +88,8 @@
 #define HAPI_SAFETY_OVERDRAFT_LEAST 1e-5 /* J */
 #define HAPI_SAFETY_DEBT_AFTER_S 0.3     /* s */
 #define HAPI_SAFETY_DEBT_S 0.3           /* s */
+#define HAPI_SAFETY_SHAKE_LARGE 0.1      /* 1 */
+#define HAPI_SAFETY_SHAKE_S 0.009        /* s */
 
 /* ---- what is declared beside contacts ---- */
 #define HAPI_SAFETY_POWER_S 0.1     /* s */

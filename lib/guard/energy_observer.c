@@ -398,6 +398,17 @@ static void hold_back(hapi_pointer *p, double force[3], const double way[3], dou
   }
 }
 
+/* A force that is to be cut by much, on a way that has turned round since the last tick. No hand
+ * goes so; positions with noise do, and the force would come and go with them. */
+static void shake_note(hapi_pointer *p, double gives, double share)
+{
+  hapi_guard_pointer *g = &p->guard;
+  double way = world_per_device(p) * hapi_v3_norm(g->moved);
+  double most = HAPI_SAFETY_SHAKE_LARGE * p->device.limits.max_force;
+  g->shakes = gives > 0.0 && (1.0 - share) * gives > most * way &&
+              hapi_v3_dot(g->moved, g->moved_before) < 0.0;
+}
+
 #define EASED_MOST 1000.0 /* ticks */
 
 /* N, most of a force along a way a tick that falls to zero by a rate a tick, and gives no more than
@@ -453,6 +464,7 @@ static void pay_no_more_than(const hapi_pointers *pointers, double budget, doubl
     double eased = eased_period > 0.0 && gives > 0.0 && budget + in > 0.0
                        ? eased_share(p, eased_period, (budget + in) * gives / out)
                        : 1.0;
+    shake_note(p, gives, hapi_min(share, eased));
     hold_back(p, p->device.wrench.force, p->guard.moved, hapi_min(share, eased));
     hold_back(p, p->device.wrench.torque, p->guard.turned, share);
   }

@@ -133,6 +133,8 @@ static __attribute__((noinline, cold)) void turn_follow_held(hapi_pointer *p)
 static void way_follow(hapi_pointer *p)
 {
   hapi_guard_pointer *g = &p->guard;
+  g->shakes = false;
+  hapi_v3_copy(g->moved, g->moved_before);
   hapi_v3_sub(p->device.pose.position, g->position, g->moved);
   hapi_v3_copy(p->device.pose.position, g->position);
   if (p->shape.hull != NULL) {

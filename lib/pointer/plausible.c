@@ -18,7 +18,9 @@
  *   jump   The next positions go on from the new place, by the same bound, for a few ms. Then they
  *          are believed, and contacts begin anew: nobody felt the way there (coupling.c).
  *   noise  Neither. Doubt adds up, as it does while the device itself says that it does not believe
- *          what it measures. Force fades with it and then a fault is latched.
+ *          what it measures. Force fades with it and then a fault is latched. Noise within the
+ *          bound of a hand makes energy of a spring, which the observer takes; where that takes
+ *          much of the force, to and fro, it counts as doubt, too.
  *
  * Time between positions is what counts, not the tick: some devices tell the same position for
  * several ticks. They are known by the time before each change of more than some quanta
@@ -262,6 +264,7 @@ static void doubt_follow(hapi_pointer *p, bool doubted, double seconds)
   hapi_pointer_belief *b = &p->belief;
   bool pushes = p->guard.share > 0.0;
   b->doubted = doubted;
+  b->doubt_s += p->guard.shakes ? HAPI_SAFETY_SHAKE_S : 0.0;
   b->doubt_s = doubted  ? b->doubt_s + seconds
                : pushes ? hapi_max(b->doubt_s - HAPI_SAFETY_DOUBT_FORGET * seconds, 0.0)
                         : 0.0;
