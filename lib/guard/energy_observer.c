@@ -398,15 +398,14 @@ static void hold_back(hapi_pointer *p, double force[3], const double way[3], dou
   }
 }
 
-/* A force that is to be cut by much, on a way that has turned round since the last tick. No hand
- * goes so; positions with noise do, and the force would come and go with them. */
+/* A force that is to be cut by much, on a way that turned round in the last tick and in this one.
+ * No hand goes so; positions with noise do, and the force would come and go with them. */
 static void shake_note(hapi_pointer *p, double gives, double share)
 {
   hapi_guard_pointer *g = &p->guard;
   double way = world_per_device(p) * hapi_v3_norm(g->moved);
   double most = HAPI_SAFETY_SHAKE_LARGE * p->device.limits.max_force;
-  g->shakes = gives > 0.0 && (1.0 - share) * gives > most * way &&
-              hapi_v3_dot(g->moved, g->moved_before) < 0.0;
+  g->shakes = gives > 0.0 && (1.0 - share) * gives > most * way && g->turns >= 2;
 }
 
 #define EASED_MOST 1000.0 /* ticks */
