@@ -402,9 +402,9 @@ TEST(what_the_energy_observer_takes_to_and_fro_is_doubt)
   for (int i = 0; i < 4; ++i) {
     CHECK((hand.belief.loss >= 1.0) == (i >= 3));
     CHECK(i != 1 || (hand.belief.loss > 0.3 && hand.belief.loss < 0.4));
-    hand.guard.shakes = true;
+    hand.belief.shakes = true;
     (void)hand_tell(0.0, MS);
-    hand.guard.shakes = false;
+    hand.belief.shakes = false;
     (void)hand_tell(0.0, MS);
   }
 }
@@ -477,8 +477,8 @@ static const noise_row noise_rows[] = {
     {"noise_of_2_mm_is_a_fault", 2e-3, 1000.0, false, true},
 };
 
-/* At 5 kHz, 5 mm deep in a wall. What noise makes is no more than k times the noise, or the fault is
- * there. Of a soft wall the steps are small. */
+/* At 5 kHz, 5 mm deep in a wall. What noise makes is no more than k times the noise, or the fault
+ * is there. Of a soft wall the steps are small. */
 TEST_EACH(noise_rows, const noise_row *row)
 {
   const hap_device_ops ops = {HAP_DEVICE_ABI,     sizeof ops,  "noisy",        "noise",

@@ -405,7 +405,7 @@ static void shake_note(hapi_pointer *p, double gives, double share)
   hapi_guard_pointer *g = &p->guard;
   double way = world_per_device(p) * hapi_v3_norm(g->moved);
   double most = HAPI_SAFETY_SHAKE_LARGE * p->device.limits.max_force;
-  g->shakes = gives > 0.0 && (1.0 - share) * gives > most * way && g->turns >= 2;
+  p->belief.shakes = gives > 0.0 && (1.0 - share) * gives > most * way && p->belief.turns >= 2;
 }
 
 #define EASED_MOST 1000.0 /* ticks */

@@ -134,7 +134,7 @@ static void way_follow(hapi_pointer *p)
 {
   hapi_guard_pointer *g = &p->guard;
   double before[3];
-  g->shakes = false;
+  p->belief.shakes = false;
   hapi_v3_copy(g->moved, before);
   hapi_v3_sub(p->device.pose.position, g->position, g->moved);
   hapi_v3_copy(p->device.pose.position, g->position);
@@ -148,7 +148,7 @@ static void way_follow(hapi_pointer *p)
     hapi_v3_set(g->turned, 0.0, 0.0, 0.0);
     g->placed = true;
   }
-  g->turns = hapi_v3_dot(g->moved, before) < 0.0 ? g->turns + 1 : 0;
+  p->belief.turns = hapi_v3_dot(g->moved, before) < 0.0 ? p->belief.turns + 1 : 0;
 }
 
 /* N by which motion of the pointer and of the surfaces may have changed its force in this tick. Of

@@ -48,6 +48,8 @@ typedef struct hapi_pointer_belief {
   bool sure;                /* that pose was told for long enough */
   double votes; /* s, for the pose that is believed, less those for others, since it came */
   hapi_elsewhere elsewhere;
+  uint32_t turns; /* how often running the way from tick to tick has turned round */
+  bool shakes;    /* it turns round, and the energy observer took much of the force */
   double doubt_s;
   double loss; /* 0..1, share of the force that doubt has taken */
 } hapi_pointer_belief;

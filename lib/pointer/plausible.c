@@ -264,7 +264,7 @@ static void doubt_follow(hapi_pointer *p, bool doubted, double seconds)
   hapi_pointer_belief *b = &p->belief;
   bool pushes = p->guard.share > 0.0;
   b->doubted = doubted;
-  b->doubt_s += p->guard.shakes ? HAPI_SAFETY_SHAKE_S : 0.0;
+  b->doubt_s += b->shakes ? HAPI_SAFETY_SHAKE_S : 0.0;
   b->doubt_s = doubted  ? b->doubt_s + seconds
                : pushes ? hapi_max(b->doubt_s - HAPI_SAFETY_DOUBT_FORGET * seconds, 0.0)
                         : 0.0;

@@ -207,8 +207,6 @@ typedef struct hapi_guard_pointer {
   double position[3]; /* at the last tick */
   double quat[4];
   double moved[3];  /* since the tick before */
-  uint32_t turns;   /* how often running that way has turned round */
-  bool shakes;      /* it turns round, and the energy observer took much of the force */
   double turned[3]; /* rad, likewise, of a device that gives torque */
   hapi_change_bound change;
   hap_wrench wanted;  /* before the guard */
