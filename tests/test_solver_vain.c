@@ -24,7 +24,7 @@ typedef struct figures {
   uint32_t rows;
 } figures;
 
-static figures push_row(int count)
+static figures push_row(int count, double accuracy)
 {
   figures out = {0};
   contact_world *w = cw_new(CW_GRAVITY);
@@ -33,6 +33,7 @@ static figures push_row(int count)
     cw_add_cube(w, 0.15, EDGE, EDGE * i, 0.0, 0.5 * EDGE);
   }
   w->def.physics_hz = 60.0;
+  w->def.accuracy = accuracy;
   w->hand_def.radius = RADIUS;
   w->hand_velocity[0] = SPEED;
   cw_start(w, -0.5 * EDGE - RADIUS, 0.0, 0.5 * EDGE);
@@ -61,7 +62,7 @@ static figures push_row(int count)
  * what slides is felt. */
 TEST(what_is_in_vain_rests)
 {
-  figures f = push_row(44);
+  figures f = push_row(44, 1.0);
   CHECK(f.rests > TICKS / 4 && f.tried > 1 && f.tried < TICKS / 20);
   CHECK(f.most < 2.0 * (20000.0 + 2.0 * f.rows));
   CHECK_NEAR(f.force, 0.5 * 44 * 0.15 * 9.81, 0.05 * 44 * 0.15 * 9.81);
@@ -69,6 +70,6 @@ TEST(what_is_in_vain_rests)
 
 TEST(what_is_solved_does_not)
 {
-  figures f = push_row(3);
-  CHECK(f.rests == 0 && f.solved > 0);
+  figures f = push_row(3, 1.0);
+  CHECK(f.solved > 3 * f.tried);
 }

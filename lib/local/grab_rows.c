@@ -94,6 +94,7 @@ static void add_row(hapi_pointer *p, const hapi_local_body *body, uint32_t numbe
   HAPI_ASSERT_INDEX(index, rows->capacity);
   row_columns(p, body, number, row);
   row_spring(p, body, number, row, &spring);
+  hapi_spring_note(rows, p, spring.k, spring.a);
   if (!hapi_spring_soften(row, p, &spring, period)) {
     return;
   }

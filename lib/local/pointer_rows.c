@@ -332,6 +332,7 @@ static void add_row(double period, hapi_local_contact *contact, const hapi_place
     ++at->pointer->rigid_move.near_rows;
   }
   set_columns(contact, at, row, &p);
+  hapi_spring_note(rows, of, hapi_touch_stiffness(contact, of), p.a);
   bool pushes = at->pointer->coupling.integration == HAP_INTEGRATION_EXPLICIT
                     ? row_fix(row, &p, contact->feel.pull, period)
                     : hapi_spring_soften(row, at->pointer, &p, period);

@@ -458,6 +458,7 @@ void hapi_physics_make_model(hapi_physics *physics, int64_t state_ns, int64_t va
   out->wishes = cycle->wishes;
   out->max_sweeps = cycle->settings.max_sweeps;
   out->row_updates = cycle->settings.row_updates;
+  out->force_drift = cycle->settings.force_drift;
   out->tick_work =
       hapi_room_work(physics->room.pace + physics->room.margin, physics->config.haptic_hz);
   out->sent_ns = hapi_tape_sent(&physics->tape, cycle);

@@ -15,13 +15,14 @@
 #define DEAR_RUNS 32u
 #define CALM_UPDATES 4000u /* row updates of hapi_solver_sweep_on, and two sweeps */
 
-/* A direct solve that costs more than this is in vain when it leads to nothing better. After so
- * many such runs direct solves rest, and all of the budget is for sweeps; the rest doubles each
- * time that the next one is in vain as well. */
-#define VAIN_COST 4000u /* row updates */
-#define VAIN_RUNS 4u
-#define VAIN_REST 16u
+/* After a run whose direct solves led to nothing better they rest, and all of the budget is for
+ * sweeps. The rest doubles each time that the next one is in vain as well. */
+#define VAIN_REST 8u
 #define VAIN_REST_MOST 256u
+
+/* A direct solve costs about as much as so many sweeps, and is made where they will not do. */
+#define DIRECT_SWEEPS 13
+#define RATE_MOST 0.99 /* of sweeps that lead nowhere */
 
 /* ---- preparation ---- */
 
@@ -153,25 +154,39 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
 
 /* ---- sweeps ---- */
 
-/* The correction of one row, m/s. The rows of a body wait for each other, so that the way from v to
- * v counts: the change is cut by itself and not taken as the difference of two impulses. */
-static double row_update(hapi_solver *solver, hapi_row *row)
+/* Of the rows that a sweep has updated so far. */
+typedef struct corrections {
+  double largest; /* m/s */
+  double energy2; /* J, sum of impulse^2 x response */
+} corrections;
+
+static inline void correction_note(const hapi_row *row, double change, corrections *io)
+{
+  double correction = change * row->response;
+  double size = fabs(correction);
+  io->largest = size > io->largest ? size : io->largest;
+  io->energy2 += change * correction;
+}
+
+/* The rows of a body wait for each other, so that the way from v to v counts: the change is cut by
+ * itself and not taken as the difference of two impulses. */
+static void row_update(hapi_solver *solver, hapi_row *row, corrections *io)
 {
   if (row->inverse == 0.0) {
-    return 0.0;
+    return;
   }
   double lo;
   double hi;
   hapi_row_bounds(solver->rows, row, &lo, &hi);
   double old = row->impulse;
   if (hi == 0.0 && lo == 0.0 && old == 0.0) {
-    return 0.0; /* friction of a contact that does not push */
+    return; /* friction of a contact that does not push */
   }
   double wanted = hapi_row_error(solver, row) * row->inverse;
   double change = hapi_clamp(wanted, lo - old, hi - old);
   hapi_row_push(solver, row, change);
   row->impulse = hapi_clamp(old + wanted, lo, hi); /* exactly at its bound */
-  return fabs(change) * row->response;
+  correction_note(row, change, io);
 }
 
 /* The change of a row's impulse, cut at its bounds. */
@@ -198,7 +213,7 @@ static void push_triple(double v[6], const double d[3], const double b0[6], cons
 
 /* As three updates, but the velocities are read and written once: what the first changes do to the
  * later rows comes from the couplings. So the three do not wait for each other's way through v. */
-static double update_triple(hapi_solver *solver, hapi_row *r)
+static void update_triple(hapi_solver *solver, hapi_row *r, corrections *io)
 {
   double e[3];
   double d[3];
@@ -207,7 +222,7 @@ static double update_triple(hapi_solver *solver, hapi_row *r)
   }
   d[0] = row_change(&r[0], e[0], r[0].lo, r[0].hi);
   if (d[0] == 0.0 && r[0].impulse <= 0.0 && r[1].impulse == 0.0 && r[2].impulse == 0.0) {
-    return 0.0; /* a contact that does not push */
+    return; /* a contact that does not push */
   }
   double most = hapi_friction_most(&r[1], r[0].impulse);
   d[1] = row_change(&r[1], e[1] - r[1].coupling[0] * d[0], -most, most);
@@ -217,12 +232,9 @@ static double update_triple(hapi_solver *solver, hapi_row *r)
   if (r->paired) {
     push_triple(solver->v[r->b], d, r[0].bb, r[1].bb, r[2].bb);
   }
-  double largest = fabs(d[0]) * r[0].response;
-  for (int i = 1; i < 3; ++i) {
-    double correction = fabs(d[i]) * r[i].response;
-    largest = correction > largest ? correction : largest;
+  for (int i = 0; i < 3; ++i) {
+    correction_note(&r[i], d[i], io);
   }
-  return largest;
 }
 
 /* As three warm starts, but the velocities are read and written once. */
@@ -331,41 +343,63 @@ double hapi_ball_update(hapi_solver *solver, hapi_row *first)
   return largest;
 }
 
-static double update_group(hapi_solver *solver, uint32_t first, uint32_t end, double largest)
+static void update_ball(hapi_solver *solver, hapi_row *first, corrections *io)
 {
+  double old[3];
+  for (int i = 0; i < first->ball; ++i) {
+    old[i] = first[i].impulse;
+  }
+  io->largest = fmax(io->largest, hapi_ball_update(solver, first));
+  for (int i = 0; i < first->ball; ++i) {
+    double change = first[i].impulse - old[i];
+    io->energy2 += change * change * first[i].response;
+  }
+}
+
+static void update_group(hapi_solver *solver, uint32_t first, uint32_t end, corrections *io)
+{
+  corrections sum = *io;
   for (uint32_t i = first; i < end; ++i) {
     hapi_row *row = &solver->rows[i];
-    double correction = row->triple     ? update_triple(solver, row)
-                        : row->ball > 0 ? hapi_ball_update(solver, row)
-                                        : row_update(solver, row);
-    i += row->triple ? 2 : row->ball > 0 ? row->ball - 1u : 0;
-    largest = correction > largest ? correction : largest;
+    if (row->triple) {
+      update_triple(solver, row, &sum);
+      i += 2;
+    } else if (row->ball > 0) {
+      update_ball(solver, row, &sum);
+      i += row->ball - 1u;
+    } else {
+      row_update(solver, row, &sum);
+    }
   }
-  return largest;
+  *io = sum;
 }
 
 /* Backwards contact by contact, but with each normal before its frictions: they then end inside the
  * bounds that it sets. */
-static double sweep_back(hapi_solver *solver)
+static void sweep_back(hapi_solver *solver, corrections *io)
 {
-  double largest = 0.0;
   uint32_t end = solver->row_count;
   while (end > 0) {
     uint32_t first = end - 1;
     while (first > 0 && solver->rows[first].normal >= 0) {
       --first;
     }
-    largest = update_group(solver, first, end, largest);
+    update_group(solver, first, end, io);
     end = first;
   }
-  return largest;
 }
 
-static double rows_sweep(hapi_solver *solver)
+static void rows_sweep(hapi_solver *solver)
 {
+  corrections sum = {0.0, 0.0};
   ++solver->sweeps;
-  return solver->sweeps % 2 == 1 ? update_group(solver, 0, solver->row_count, 0.0)
-                                 : sweep_back(solver);
+  if (solver->sweeps % 2 == 1) {
+    update_group(solver, 0, solver->row_count, &sum);
+  } else {
+    sweep_back(solver, &sum);
+  }
+  solver->residual = sum.largest;
+  solver->corrected = sum.energy2;
 }
 
 /* ---- sweeps that look ahead ---- */
@@ -485,17 +519,22 @@ static void note_dear(hapi_solver *solver, uint64_t left, uint32_t rows)
   }
 }
 
-/* A costly direct solve that led to nothing better. */
+/* dearest: the cost of the run's direct solves; 0: there were none. */
 static void note_vain(hapi_solver *solver, uint32_t dearest)
 {
-  bool vain = dearest > VAIN_COST && solver->direct_solves == 0;
-  solver->vain_runs = vain ? solver->vain_runs + 1 : 0;
-  if (solver->vain_runs >= VAIN_RUNS && solver->dear_rows == 0) {
-    uint32_t again = solver->vain_runs - VAIN_RUNS;
-    uint32_t rest = again < 8 ? VAIN_REST << again : VAIN_REST_MOST;
+  if (dearest == 0) {
+    return;
+  }
+  if (solver->direct_solves > 0) {
+    solver->vain_runs = 0;
+    return;
+  }
+  if (solver->dear_rows == 0) {
+    uint32_t rest = solver->vain_runs < 8 ? VAIN_REST << solver->vain_runs : VAIN_REST_MOST;
     solver->dear_rows = solver->row_count;
     solver->dear_runs = rest < VAIN_REST_MOST ? rest : VAIN_REST_MOST;
   }
+  ++solver->vain_runs;
 }
 
 /* What was too dear or in vain in the last runs will be so in this one: finding out costs as much
@@ -514,7 +553,7 @@ static bool stays_dear(hapi_solver *solver)
 void hapi_solver_sweep_on(hapi_solver *solver)
 {
   for (uint32_t i = 0; i < 2 + CALM_UPDATES / solver->row_count; ++i) {
-    solver->residual = rows_sweep(solver);
+    rows_sweep(solver);
     solver->updates += solver->row_count;
   }
   check_finite(solver);
@@ -540,6 +579,32 @@ static void run_apart(hapi_solver *solver)
   check_finite(solver);
 }
 
+/* Whether what is still due may be left to the next run. */
+static bool is_settled(const hapi_solver *solver)
+{
+  return solver->residual < solver->tolerance ||
+         (solver->residual < HAPI_COARSE && solver->corrected < solver->coarse);
+}
+
+/* Of the corrections from sweep to sweep, by those of the last three: forward and backward ones go
+ * at rates of their own. */
+static double sweeps_rate(double before2, double before, double now)
+{
+  double rate = before2 > 0.0 ? sqrt(sqrt(now / before2)) : before > 0.0 ? sqrt(now / before) : 0.0;
+  return rate < RATE_MOST ? rate : RATE_MOST;
+}
+
+/* Whether as many sweeps as a direct solve costs will do, where something may stay undone. */
+static bool sweeps_suffice(const hapi_solver *solver, double rate)
+{
+  double share = 1.0;
+  for (int i = 0; i < DIRECT_SWEEPS; ++i) {
+    share *= rate;
+  }
+  return share * solver->residual < HAPI_COARSE &&
+         share * share * solver->corrected < solver->coarse;
+}
+
 void hapi_solver_run(hapi_solver *solver)
 {
   HAPI_ASSERT(solver->hub_count <= solver->body_count);
@@ -563,31 +628,34 @@ void hapi_solver_run(hapi_solver *solver)
     run_apart(solver);
     return;
   }
-  for (uint32_t rounds = 0; rows > 0; ++rounds) {
-    do {
-      if (ahead && rounds > 0) {
-        updates_spend(solver, &left, way_cost(rows));
-        if (way.begun) {
-          way_go_on(solver, &way);
-        } else {
-          way_begin(solver, &way);
-        }
+  double before[2] = {0.0, 0.0}; /* corrected, after the last sweep and the one before */
+  for (uint32_t rounds = 0; rows > 0;) {
+    if (ahead && solver->sweeps >= 2) {
+      updates_spend(solver, &left, way_cost(rows));
+      if (way.begun) {
+        way_go_on(solver, &way);
+      } else {
+        way_begin(solver, &way);
       }
-      solver->residual = rows_sweep(solver);
-      updates_spend(solver, &left, rows);
-    } while (solver->sweeps < 2 && !(solver->residual < solver->tolerance));
-    if (solver->residual < solver->tolerance || left < rows ||
-        solver->sweeps == solver->max_sweeps) {
+    }
+    rows_sweep(solver);
+    updates_spend(solver, &left, rows);
+    double rate = sweeps_rate(before[1], before[0], solver->corrected);
+    before[1] = before[0];
+    before[0] = solver->corrected;
+    if (is_settled(solver) ||
+        (solver->sweeps >= 2 && (left < rows || solver->sweeps == solver->max_sweeps))) {
       break;
     }
     /* Direct solves may have one half of the budget: where they lead in circles between two sets of
      * active rows, sweeps from the second half still come near, and the next tick starts from
      * there. */
-    if (direct && 2 * left > solver->update_budget &&
-        (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
+    if (direct && solver->sweeps >= 2 && 2 * left > solver->update_budget &&
+        !sweeps_suffice(solver, rate) && (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
       uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
       updates_spend(solver, &left, spent);
       way.begun = false;
+      before[0] = before[1] = 0.0;
       dearest = spent > dearest ? spent : dearest;
       direct = !solver->too_dear; /* now, and so in the next round */
       if (direct && solver->direct_residual < solver->tolerance) {
@@ -598,9 +666,8 @@ void hapi_solver_run(hapi_solver *solver)
         note_dear(solver, left, rows);
       }
     }
+    rounds += solver->sweeps >= 2;
   }
-  if (may && !dear) {
-    note_vain(solver, dearest);
-  }
+  note_vain(solver, dearest);
   check_finite(solver);
 }

@@ -32,7 +32,9 @@ typedef struct hapi_solver {
   /* The last bodies of all, always b in their rows: each may touch many others, as light pointers
    * do. An island about them is solved part by part. */
   uint32_t hub_count;
-  double tolerance;       /* m/s: done when the largest correction of a sweep is below */
+  double tolerance; /* m/s: done when the largest correction of a sweep is below */
+  double coarse;    /* J: done also when the corrections of a sweep have less energy, twice the
+                           sum of impulse^2 x response, and none is HAPI_COARSE; 0: never */
   uint32_t update_budget; /* row updates in all sweeps and direct solves, these counted by their
                              cost; two sweeps are made in any case */
   uint32_t max_sweeps;    /* beyond two; 0: what update_budget allows */
@@ -52,10 +54,15 @@ typedef struct hapi_solver {
   uint64_t updates;       /* out: row updates, direct solves counted by their cost */
   uint32_t direct_solves; /* out: that were accepted */
   double residual;        /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
+  double corrected;       /* inner: J, twice the energy of the last sweep's corrections */
 } hapi_solver;
 
 /* m/s: what is left undone and may add energy; below, asking costs too much */
 #define HAPI_UNSOLVED 3e-3
+
+/* m/s: the largest correction that a run may leave undone where `coarse` allows it. The next run
+ * goes on from its impulses. */
+#define HAPI_COARSE 1e-4
 
 /* Doubles of work for stacks, chains and flat piles: 16 blocks of 6x6 for each body. A dense island
  * of n bodies takes n. */

@@ -234,6 +234,7 @@ typedef struct hapi_model {
   uint32_t wishes;        /* of the effects, base/wishes.h */
   uint32_t max_sweeps;    /* of hapi_solver */
   uint32_t row_updates;   /* its update_budget; 0: unchanged */
+  double force_drift;     /* 1/s, drift of hapi_rows */
   uint64_t tick_work;     /* row updates that a tick has time for; 0: no bound */
   int64_t tick_budget_ns; /* ticks that take longer are counted; 0: none are */
   uint32_t touches;       /* near pairs of pointer and geom, also those whose points come later */

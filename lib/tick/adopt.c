@@ -80,6 +80,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   HAPI_ASSERT(model->watch_count <= HAP_TRACE_BODIES_MAX);
   hapi_local_bodies_adopt(&tick->bodies, model, now_ns, age_s, facts);
   solver->max_sweeps = model->max_sweeps;
+  tick->rows.drift = model->force_drift;
   if (model->row_updates > 0) {
     solver->update_budget = model->row_updates;
   }

@@ -29,6 +29,9 @@
 #define TURN_MAX 0.05     /* rad a substep of the gyroscopic motion */
 #define TURN_SUBSTEPS 100 /* at most, a tick */
 
+#define COARSE_MOST 1e-10 /* J, of a sweep's corrections that stay undone in a tick */
+#define COARSE_FADE 0.98  /* a tick */
+
 /* ---- bodies ---- */
 
 static void body_begin(hapi_local_body *body, const hapi_patches *patches)
@@ -56,6 +59,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   solver->body_count = 1;
   solver->row_count = 0;
   solver->apart = true;
+  rows->hand = HUGE_VAL;
   bodies->resting = 0;
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
@@ -360,6 +364,20 @@ static void rows_note_unsolved(hapi_rows *rows)
   rows->unsolved_most = rows->unsolved > rows->unsolved_most ? rows->unsolved : rows->unsolved_most;
 }
 
+/* What the solves of this tick may leave undone: by the springs to hands. It fades where their
+ * forces become less, and stays while a hand that touched is in reach, as one that taps. */
+static void rows_set_coarse(hapi_rows *rows, bool reaches)
+{
+  double most = rows->drift > 0.0 ? COARSE_MOST : 0.0;
+  bool touches = rows->hand < HUGE_VAL;
+  double before = rows->touched ? rows->solver.coarse : 0.0;
+  rows->touched = reaches && (rows->touched || touches);
+  if (touches) {
+    before = hapi_max(rows->drift * rows->drift * rows->hand, COARSE_FADE * before);
+  }
+  rows->solver.coarse = rows->touched ? hapi_min(before, most) : most;
+}
+
 static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
 {
   hapi_solver *solver = &rows->solver;
@@ -497,6 +515,7 @@ void hapi_contact_step(hapi_tick *tick)
     hapi_own_push(&at);
   }
   rows_make(tick);
+  rows_set_coarse(&tick->rows, tick->touches.count > 0);
   rows_solve(&tick->rows, &tick->sample);
   bool again = rows_stop_push_out(&tick->rows);
   bodies_step(&tick->bodies, &tick->rows, &tick->facts, &tick->sample);
