@@ -37,12 +37,19 @@ static hapi_touch touch_swapped(hapi_touch touch)
   return HAPI_TOUCH_EDGES;
 }
 
-static bool balls_apart(const hapi_solid *a, const hapi_solid *b, double margin)
+static bool balls_apart(const hapi_pair *pair)
 {
+  const hapi_solid *a = pair->a;
+  const hapi_solid *b = pair->b;
   double between[3];
   hapi_v3_sub(a->center, b->center, between);
-  double reach = a->reach + b->reach + a->ball + b->ball + margin;
-  return reach < 0.0 || hapi_v3_dot(between, between) > reach * reach;
+  double reach = a->reach + b->reach + a->ball + b->ball;
+  double limit = reach + pair->margin;
+  bool apart = limit < 0.0 || hapi_v3_dot(between, between) > limit * limit;
+  if (apart) {
+    pair->out->apart = hapi_v3_norm(between) - reach;
+  }
+  return apart;
 }
 
 /* The kinds come in the order of the enumeration. */
@@ -52,7 +59,7 @@ static bool find_ordered(const hapi_pair *pair)
   if (pair->a->kind == HAPI_SHAPE_PLANE || pair->b->kind == HAPI_SHAPE_PLANE) {
     return hapi_patch_plane(pair);
   }
-  if (balls_apart(pair->a, pair->b, pair->margin)) {
+  if (balls_apart(pair)) {
     return true;
   }
   if (pair->a->kind == HAPI_SHAPE_SPHERE) {
@@ -74,6 +81,7 @@ bool hapi_patch_find(const hapi_shape *a, const hap_pose *pose_a, const hapi_sha
 {
   hapi_solid solid[2];
   out->count = 0;
+  out->apart = 0.0;
   if (!(margin < (double)INFINITY) || !hapi_pair_place(a, pose_a, b, pose_b, solid)) {
     return false;
   }

@@ -53,6 +53,7 @@ typedef struct hapi_patch_point {
 
 typedef struct hapi_patch {
   int count;
+  double apart; /* m, without points: the shapes are not nearer than this; 0: not known */
   hapi_patch_point points[HAPI_PATCH_POINTS]; /* deepest first */
 } hapi_patch;
 

@@ -216,6 +216,7 @@ bool hapi_patch_boxes(const hapi_pair *pair)
   sat_faces(&s);
   double best = fmax(s.face[0], s.face[1]);
   if (best > pair->margin) {
+    pair->out->apart = best;
     return true;
   }
   double depth = fmax(0.0, -best);
@@ -234,7 +235,11 @@ bool hapi_patch_boxes(const hapi_pair *pair)
     if (hapi_v3_dot(between, normal) < 0.0) {
       hapi_v3_scale(-1.0, normal, normal);
     }
-    if (s.edge > pair->margin || add_edges_or_near(pair, &s, normal)) {
+    if (s.edge > pair->margin) {
+      pair->out->apart = s.edge;
+      return true;
+    }
+    if (add_edges_or_near(pair, &s, normal)) {
       return true;
     }
   }

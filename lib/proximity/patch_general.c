@@ -166,6 +166,7 @@ bool hapi_patch_general(const hapi_pair *pair)
   g.pair = pair;
   bool trusted = hapi_patch_guess(pair->a, pair->b, &guess);
   if (guess.distance - pair->a->ball - pair->b->ball > pair->margin) {
+    pair->out->apart = guess.distance - pair->a->ball - pair->b->ball;
     return true;
   }
   g.cores = guess;

@@ -42,6 +42,16 @@ static int box_spots(const hapi_solid *box, const hapi_frame *frame, double marg
   return 4 + spots_of(frame, face.corner, 4, out + 4);
 }
 
+/* m; those that are not among the spots are beyond the margin. */
+static double least_gap(const hapi_spot *spots, int count, double margin)
+{
+  double least = count > 0 ? spots[0].gap : margin;
+  for (int i = 1; i < count; ++i) {
+    least = hapi_min(spots[i].gap, least);
+  }
+  return least;
+}
+
 /* When there are more corners near the plane than places, those seen so far are reduced to the four
  * that matter most. */
 static int hull_spots(const hapi_solid *hull, const hapi_frame *frame, const hapi_pair *pair,
@@ -123,6 +133,7 @@ bool hapi_patch_plane(const hapi_pair *pair)
     hapi_v3_scale(-solid->ball, frame.normal, corners.lift);
     count = hull_spots(solid, &frame, pair, spots);
   }
+  pair->out->apart = least_gap(spots, count, pair->margin);
   hapi_patch_add_spots(pair, plane_is_a, &frame, &corners, spots, count);
   return true;
 }
