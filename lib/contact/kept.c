@@ -11,6 +11,8 @@
 
 #define NONE HAPI_SLOT_NONE
 
+#define TABLE_SHARE 4u /* the next power of two behind twice as many */
+
 /* An angle is not more than this times the length of the difference of the quaternions: 4 asin(d/2)
  * of d, up to a radian. */
 #define TURN_OF_CHORD 2.1
@@ -18,16 +20,15 @@
 
 bool hapi_kept_create(hapi_kept *kept, const hapi_capacity *capacity, bool asks)
 {
-  kept->pair_capacity = capacity->pairs;
   kept->contact_capacity = capacity->contacts;
   kept->pairs = hapi_alloc_array(capacity->pairs, sizeof *kept->pairs);
   kept->older = hapi_alloc_array(capacity->pairs, sizeof *kept->older);
   kept->contacts = hapi_alloc_array(capacity->contacts, sizeof *kept->contacts);
   kept->next = hapi_alloc_array(capacity->contacts, sizeof *kept->next);
+  kept->table = hapi_alloc_array(capacity->pairs, TABLE_SHARE * sizeof *kept->table);
   kept->ends = asks ? hapi_alloc_array(capacity->contacts, sizeof *kept->ends) : NULL;
   return kept->pairs != NULL && kept->older != NULL && kept->contacts != NULL &&
-         kept->next != NULL && (!asks || kept->ends != NULL) &&
-         hapi_index_reserve(&kept->old, capacity->pairs);
+         kept->next != NULL && kept->table != NULL && (!asks || kept->ends != NULL);
 }
 
 void hapi_kept_finish(hapi_kept *kept)
@@ -37,7 +38,7 @@ void hapi_kept_finish(hapi_kept *kept)
   hapi_free(kept->contacts);
   hapi_free(kept->next);
   hapi_free(kept->ends);
-  hapi_index_finish(&kept->old);
+  hapi_free(kept->table);
   *kept = (hapi_kept){0};
 }
 
@@ -124,25 +125,41 @@ static void pair_hand_over(hapi_kept_pair *from, hapi_kept_pair *to)
   from->valid = false;
 }
 
+/* At most half full; keys are mixed well. */
+static void table_fill(hapi_kept *kept, uint32_t count)
+{
+  kept->places = 2;
+  while (kept->places < 2 * count) {
+    kept->places *= 2;
+  }
+  memset(kept->table, 0, kept->places * sizeof *kept->table);
+  for (uint32_t i = 0; i < count; ++i) {
+    uint32_t at = (uint32_t)kept->older[i].key & (kept->places - 1);
+    while (kept->table[at] != 0) {
+      at = (at + 1) & (kept->places - 1);
+    }
+    kept->table[at] = i + 1;
+  }
+}
+
 /* Two messages are mostly in the same order. */
 static hapi_kept_pair *older_find(hapi_kept *kept, uint32_t count, uint64_t key, uint32_t *io_at)
 {
   if (*io_at < count && kept->older[*io_at].key == key) {
     return &kept->older[(*io_at)++];
   }
-  if (!kept->indexed) {
-    hapi_index_clear(&kept->old);
-    for (uint32_t i = 0; i < count; ++i) {
-      hapi_index_put(&kept->old, kept->older[i].key, i);
+  if (kept->places == 0) {
+    table_fill(kept, count);
+  }
+  for (uint32_t i = (uint32_t)key & (kept->places - 1); kept->table[i] != 0;
+       i = (i + 1) & (kept->places - 1)) {
+    hapi_kept_pair *found = &kept->older[kept->table[i] - 1];
+    if (found->key == key) {
+      *io_at = kept->table[i];
+      return found;
     }
-    kept->indexed = true;
   }
-  uint32_t at = hapi_index_get(&kept->old, key);
-  if (at == HAPI_INDEX_NONE) {
-    return NULL;
-  }
-  *io_at = at + 1;
-  return &kept->older[at];
+  return NULL;
 }
 
 void hapi_kept_take_near(hapi_kept *kept, const hapi_places *places)
@@ -153,7 +170,7 @@ void hapi_kept_take_near(hapi_kept *kept, const hapi_places *places)
   kept->pairs = kept->older;
   kept->older = older;
   kept->count = 0;
-  kept->indexed = false;
+  kept->places = 0;
   for (uint32_t i = 0; i < places->near->pair_count;) {
     hapi_kept_pair *pair = &kept->pairs[kept->count++];
     i = pair_describe(places, i, pair);

@@ -9,7 +9,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "base/index.h"
 #include "contact/places.h"
 
 /* How far two bodies may go against each other, in parts of the smaller one's extent and in all,
@@ -62,14 +61,13 @@ typedef struct hapi_kept {
   hapi_kept_pair *pairs; /* of the near message */
   hapi_kept_pair *older; /* scratch: of the message before */
   uint32_t count;
-  uint32_t pair_capacity;
   hapi_patch_contact *contacts;
   hapi_kept_ends *ends; /* by contact */
   uint32_t *next;       /* by contact */
   uint32_t contact_capacity;
-  uint32_t free;  /* the first contact that is not in use */
-  hapi_index old; /* of pairs of the message before, by key */
-  bool indexed;   /* they are in it */
+  uint32_t free;   /* the first contact that is not in use */
+  uint32_t *table; /* of pairs of the message before, by key: number + 1; 0: free */
+  uint32_t places; /* of the table; 0: not filled */
 } hapi_kept;
 
 /* asks: the application is asked about contacts. False: no memory; finish is due all the same. */

@@ -11,6 +11,8 @@
 
 #define MARGIN_SPEED 1.5 /* of the way that the bodies' speed makes until the next pass */
 #define MARGIN_GRAVITY 9.81
+#define STEPS_PER_UNIT 1073741824.0 /* about 1 nm */
+#define STEPS_MOST 1e9
 #define ROUNDING 1e-9 /* m, and part, of distances far from the world's origin */
 
 bool hapi_places_create(hapi_places *places, const hapi_capacity *capacity)
@@ -39,17 +41,29 @@ void hapi_places_begin(hapi_places *places)
 
 /* ---- what follows from geoms alone ---- */
 
+/* Poses and corners in the frame of a body come from those in the world, and have other last bits in
+ * each message. Whole steps of a nanometre are the same, but where a value is between two of them:
+ * then the contacts are found anew. */
+static uint64_t hash_steps(uint64_t hash, const double *values, int count)
+{
+  for (int i = 0; i < count; ++i) {
+    double steps = hapi_max(hapi_min(values[i], STEPS_MOST), -STEPS_MOST) * STEPS_PER_UNIT;
+    hash = hapi_hash_word(hash, (uint64_t)(int64_t)(steps + (steps < 0.0 ? -0.5 : 0.5)));
+  }
+  return hash;
+}
+
 static uint64_t geom_stamp(const hapi_near_geom *geom, const double *hull)
 {
   const hapi_shape *s = &geom->shape;
-  const double sizes[] = {s->radius, s->half[0], s->half[1], s->half[2], s->rounding, geom->extent};
+  const double sizes[] = {s->radius, s->half[0], s->half[1], s->half[2], s->rounding};
   uint64_t hash = hapi_hash_word(HAPI_HASH_BEGIN, ((uint64_t)geom->body << 32) | geom->generation);
   hash = hapi_hash_word(hash, ((uint64_t)s->kind << 32) | geom->open_edges);
   hash = hapi_hash_doubles(hash, sizes, (int)(sizeof sizes / sizeof sizes[0]));
-  hash = hapi_hash_doubles(hash, geom->pose.position, 3);
-  hash = hapi_hash_doubles(hash, geom->pose.quat_wxyz, 4);
+  hash = hash_steps(hash, geom->pose.position, 3);
+  hash = hash_steps(hash, geom->pose.quat_wxyz, 4);
   hash = hapi_hash_word(hash, s->hull_count);
-  return hull == NULL ? hash : hapi_hash_doubles(hash, hull, 3 * (int)s->hull_count);
+  return hull == NULL ? hash : hash_steps(hash, hull, 3 * (int)s->hull_count);
 }
 
 /* The mean of the corners, and the farthest of them. */
