@@ -18,11 +18,12 @@
  * gap and normal right to first order, as between two passes. What goes stale is where the border of
  * a face cuts the other one: of a corner that has left the face, or come over it, the lever is
  * wrong by as much as the bodies have gone, and where an edge runs along the border by up to five
- * times as much (LEAST_SINE in patch_add.c). A cube's lever is half an edge, 0.58 of its extent: 4e-4
- * of the extent is 0.07 % of it, 0.35 % at worst. Errors do not add up, as the way counts from where
- * the contacts were found. Gaps are wrong by way^2 / lever, a nanometre. */
-#define HAPI_KEPT_SHARE 4e-4
-#define HAPI_KEPT_WAY 2e-5 /* m */
+ * times as much (LEAST_SINE in patch_add.c). A cube's lever is half an edge, 0.58 of its extent: 5e-5
+ * of the extent is 1e-4 of the lever, 5e-4 at worst. Errors do not add up, as the way counts from
+ * where the contacts were found. Gaps are wrong by way^2 / lever, less than a nanometre. Ten times
+ * as much would be as good for the levers, but in a dense pile that slips, other bricks would stick. */
+#define HAPI_KEPT_SHARE 5e-5
+#define HAPI_KEPT_WAY 2e-6 /* m */
 
 /* Some contacts tell a direction in world axes, for its sign: until the bodies have turned by this
  * much. Of the difference of two quaternions. */
