@@ -32,7 +32,8 @@ typedef struct hapi_visit {
   uint64_t gathered_in; /* asked whether its mechanism can be owned */
   uint64_t refused_in;  /* looked ahead to, with more than there is room for */
   uint64_t island_in;   /* looked ahead to */
-  int32_t hops; /* from the neighbours; of a mechanism those of the body that was met first */
+  int32_t hops;   /* from the neighbours; of a mechanism those of the body that was met first */
+  double after_s; /* not before that something may set it in motion; 0: at once */
 } hapi_visit;
 
 struct hapi_nearby {

@@ -25,9 +25,6 @@
  *
  * What is written here is what the contact thread needs: geoms, and pairs with their surfaces. */
 
-#define LINK_FLOOR 0.005 /* m, at least so near counts as a link */
-#define LINK_GRAVITY 9.81
-
 bool hapi_range_has_room(hapi_nearby *nearby, uint32_t bodies)
 {
   hapi_range *range = &nearby->range;
@@ -56,6 +53,7 @@ static bool range_enqueue(hapi_nearby *nearby, uint32_t known)
   HAPI_ASSERT_INDEX(known, nearby->visit_capacity);
   hapi_visit *visit = &nearby->visits[known];
   if (visit->ranged_in == range->number) {
+    visit->after_s = fmin(visit->after_s, range->after_s);
     return true;
   }
   uint32_t slot = hapi_slots_body(nearby, known);
@@ -66,6 +64,7 @@ static bool range_enqueue(hapi_nearby *nearby, uint32_t known)
   hapi_body_slot *local = &nearby->slots.bodies[slot];
   visit->ranged_in = range->number;
   visit->hops = range->hops;
+  visit->after_s = dBodyIsEnabled(body->body) ? 0.0 : range->after_s;
   local->wanted = true;
   local->linked = false;
   local->mass = hapi_body_mass(body->body);
@@ -493,7 +492,7 @@ static void take_tools(hapi_nearby *nearby, uint32_t hit_count)
   }
 }
 
-/* ---- links: what is near a body ---- */
+/* ---- roles ---- */
 
 static bool geom_is_known(dGeomID geom)
 {
@@ -512,126 +511,6 @@ static bool geom_is_known(dGeomID geom)
       return false;
   }
 }
-
-static bool bits_meet(dGeomID a, dGeomID b)
-{
-  return (dGeomGetCategoryBits(a) & dGeomGetCollideBits(b)) != 0 ||
-         (dGeomGetCategoryBits(b) & dGeomGetCollideBits(a)) != 0;
-}
-
-static double surface_speed(const hapi_known_body *known)
-{
-  hap_twist twist;
-  hapi_extent_twist(known, &twist);
-  return hapi_v3_norm(twist.linear) + known->extent * hapi_v3_norm(twist.angular);
-}
-
-/* How far two surfaces may come nearer until the model after the next. */
-static double link_reach(const hapi_nearby *nearby, double speed)
-{
-  double seconds = 2.0 * nearby->cycle->probe_step_s;
-  return LINK_FLOOR + 1.5 * speed * seconds + 0.5 * LINK_GRAVITY * seconds * seconds;
-}
-
-/* Largest gap along an axis; the same of (b, a), to the last bit. */
-static double boxes_gap(const dReal a[6], const dReal b[6])
-{
-  double gap = -HUGE_VAL;
-  for (int k = 0; k < 6; k += 2) {
-    double behind = a[k] - b[k + 1];
-    double before = b[k] - a[k + 1];
-    gap = behind > gap ? behind : gap;
-    gap = before > gap ? before : gap;
-  }
-  return gap;
-}
-
-/* With the links of the other body, which this walk has taken. */
-static bool met_before(const hapi_nearby *nearby, uint32_t known, double gap, double other_speed)
-{
-  const hapi_range *range = &nearby->range;
-  if (known == HAPI_NONE || nearby->visits[known].ranged_in != range->number ||
-      (nearby->slots.bodies[known_body(nearby, known)->slot].flags & HAPI_BODY_OWNED) == 0) {
-    return false;
-  }
-  return gap <= link_reach(nearby, fmax(other_speed, range->fastest) + range->links.own_speed);
-}
-
-static void link_geom(void *data, dGeomID a, dGeomID b)
-{
-  hapi_nearby *nearby = data;
-  hapi_range *range = &nearby->range;
-  hapi_links *links = &range->links;
-  dGeomID geom = a == links->box_geom ? b : a;
-  if (dGeomIsSpace(geom)) {
-    dSpaceCollide2(links->box_geom, geom, data, link_geom);
-    return;
-  }
-  dBodyID body = hapi_geom_body(nearby->world, geom);
-  if (body == links->own_body || !dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass ||
-      !bits_meet(links->own_geom, geom)) {
-    return;
-  }
-  dReal box[6];
-  dGeomGetAABB(geom, box);
-  uint32_t known = body != NULL ? hapi_bodies_find(&nearby->world->bodies, body) : HAPI_NONE;
-  double other_speed = known != HAPI_NONE ? surface_speed(known_body(nearby, known)) : 0.0;
-  double reach = link_reach(nearby, fmax(links->own_speed, range->fastest) + other_speed);
-  double gap = boxes_gap(links->own_box, box);
-  if (gap > reach || met_before(nearby, known, gap, other_speed)) {
-    return;
-  }
-  if (!hapi_reserve((void **)&links->list, &links->capacity, links->count, 1,
-                    sizeof *links->list)) {
-    ++nearby->counts.dropped;
-    links->missing = true;
-    return;
-  }
-  hapi_link *link = &links->list[links->count];
-  link->own = links->own_geom;
-  link->other = geom;
-  link->body = body;
-  link->known = known;
-  for (int k = 0; k < 6; ++k) {
-    link->box[k] = links->own_box[k] + (k % 2 == 0 ? -reach : reach);
-  }
-  if (hapi_world_surface(nearby->world, nearby->cycle, link)) {
-    ++links->count;
-  } else if (gap <= 0.0 && nearby->cycle->model_number == 0 &&
-             !dAreConnectedExcluding(links->own_body, body, dJointTypeContact)) {
-    links->missing = true; /* before the first step nobody knows who holds that pair apart */
-  }
-}
-
-/* The space is asked with room for the fastest body of all; each pair then has its own reach. */
-void hapi_range_links(hapi_nearby *nearby, const hapi_known_body *known)
-{
-  hapi_range *range = &nearby->range;
-  range->links.own_speed = surface_speed(known);
-  double reach =
-      link_reach(nearby, fmax(range->links.own_speed, range->fastest) + nearby->neighbors.fastest);
-  range->links.count = 0;
-  range->links.missing = false;
-  range->links.own_body = known->body;
-  for (dGeomID geom = dBodyGetFirstGeom(known->body); geom != NULL; geom = dBodyGetNextGeom(geom)) {
-    const dReal *box = range->links.own_box;
-    if (!dGeomIsEnabled(geom) || dGeomGetClass(geom) == dRayClass) {
-      continue;
-    }
-    dGeomGetAABB(geom, range->links.own_box);
-    range->links.own_geom = geom;
-    dGeomBoxSetLengths(range->links.box_geom, box[1] - box[0] + 2.0 * reach,
-                       box[3] - box[2] + 2.0 * reach, box[5] - box[4] + 2.0 * reach);
-    dGeomSetPosition(range->links.box_geom, 0.5 * (box[0] + box[1]), 0.5 * (box[2] + box[3]),
-                     0.5 * (box[4] + box[5]));
-    const hapi_cover_question question = {&nearby->world->spaces,
-                                          hapi_spaces_met(&nearby->world->spaces, geom),
-                                          range->links.box_geom};
-    hapi_cover_ask(&range->links.cover, &question, nearby, link_geom);
-  }
-}
-
-/* ---- roles ---- */
 
 static void need_geom(hapi_nearby *nearby, dGeomID geom, hapi_range_need *io)
 {
@@ -717,6 +596,7 @@ static void take_links(hapi_nearby *nearby)
   hapi_range *range = &nearby->range;
   for (uint32_t i = 0; i < range->links.count; ++i) {
     const hapi_link *link = &range->links.list[i];
+    range->after_s = link->after_s;
     range->bounces +=
         (link->surface.flags & HAPI_SURFACE_BOUNCE) != 0 && link->surface.bounce > 0.0;
     if (link->body != NULL && (link->known == HAPI_NONE || !range_enqueue(nearby, link->known))) {
@@ -798,6 +678,7 @@ static void range_expand(hapi_nearby *nearby, uint32_t index, bool seed)
   const hapi_known_body *known = known_body(nearby, index);
   const hapi_visit *visit = &nearby->visits[index];
   int32_t hops = visit->hops;
+  range->after_s = visit->after_s;
   HAPI_ASSERT_INDEX(known->slot, nearby->slots.body_high);
   hapi_body_slot *slot = &nearby->slots.bodies[known->slot];
   if (!is_dynamic(known->body) || (slot->flags & HAPI_BODY_OWNED) != 0) {
@@ -816,14 +697,31 @@ static void range_expand(hapi_nearby *nearby, uint32_t index, bool seed)
   slot->flags |= seed && tests ? HAPI_BODY_MEASURED : 0u;
 }
 
+/* What may move first is next; of equals what was met first. Then its time is known. */
+static void queue_sort(hapi_nearby *nearby, uint32_t next)
+{
+  uint32_t *queue = nearby->range.queue;
+  uint32_t first = next;
+  for (uint32_t i = next; nearby->visits[queue[first]].after_s > 0.0 && i < nearby->range.count;
+       ++i) {
+    bool sooner = nearby->visits[queue[i]].after_s < nearby->visits[queue[first]].after_s;
+    first = sooner ? i : first;
+  }
+  uint32_t chosen = queue[first];
+  memmove(queue + next + 1, queue + next, (first - next) * sizeof *queue);
+  queue[next] = chosen;
+}
+
 bool hapi_range_follow(hapi_nearby *nearby, uint32_t known)
 {
   hapi_range *range = &nearby->range;
   uint32_t next = range->count;
+  range->after_s = 0.0;
   if (!range_enqueue(nearby, known)) {
     return false;
   }
   for (; next < range->count; ++next) {
+    queue_sort(nearby, next);
     range_expand(nearby, range->queue[next], false);
   }
   return true;
@@ -879,6 +777,8 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
   range->near->always = hapi_wish_is_on(nearby->cycle->wishes, HAP_EFFECT_PASSES);
   range->refused = range->cut = false;
   range->hops = 0;
+  range->after_s = 0.0;
+  range->awake_count = 0;
   range->mechanism.joint_count = range->mechanism.count = range->mechanism.moving = 0;
   range->fastest = 0.0;
   const hapi_state_pointer *pointers = hapi_state_pointers(nearby->cycle->state);
@@ -905,7 +805,9 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
     range_expand(nearby, range->queue[next], true);
   }
   int64_t begin_ns = hapi_clock_now();
+  hapi_range_note_awake(nearby);
   for (uint32_t next = range->seeds; next < range->count; ++next) {
+    queue_sort(nearby, next);
     range_expand(nearby, range->queue[next], false);
   }
   nearby->counts.beyond_s += 1e-9 * (double)(hapi_clock_now() - begin_ns);

@@ -32,7 +32,9 @@ typedef struct hapi_links {
   dBodyID own_body; /* the body, and the geom that is asked for, while ODE calls back */
   dGeomID own_geom;
   dReal own_box[6];
-  double own_speed; /* m/s */
+  double own_speed;   /* m/s */
+  double own_after_s; /* nothing sets the body in motion before */
+  bool disturbed;     /* something near it moves by itself */
 } hapi_links;
 
 /* Bodies that joints tie together, and the joints of all mechanisms of the walk. */
@@ -43,6 +45,8 @@ typedef struct hapi_mechanism {
   uint32_t *joints; /* entries of the joint table; capacity.joints */
   uint32_t joint_count;
 } hapi_mechanism;
+
+#define HAPI_RANGE_AWAKE 32u /* that are looked at one by one */
 
 /* What looking ahead goes through: near/ahead.c. */
 typedef struct hapi_comer {
@@ -76,12 +80,15 @@ typedef struct hapi_range {
   uint32_t *queue;                          /* entries of the body table; capacity.bodies */
   uint32_t count;
   uint32_t owned;
-  int32_t hops;     /* of what is put into the queue now */
-  uint32_t seeds;   /* neighbours: the first of the queue */
-  uint32_t bounces; /* surfaces of this walk that give back speed */
-  bool refused;     /* a body within the hops that the loop cannot own */
-  bool cut;         /* a tick has no time for more bodies: settings.range_bodies */
-  double fastest;   /* m/s, of the pointers */
+  int32_t hops;                     /* of what is put into the queue now */
+  double after_s;                   /* likewise */
+  uint32_t seeds;                   /* neighbours: the first of the queue */
+  uint32_t bounces;                 /* surfaces of this walk that give back speed */
+  bool refused;                     /* a body within the hops that the loop cannot own */
+  bool cut;                         /* a tick has no time for more bodies: settings.range_bodies */
+  double fastest;                   /* m/s, of the pointers */
+  uint32_t awake[HAPI_RANGE_AWAKE]; /* bodies that may move by themselves */
+  uint32_t awake_count;             /* more than there is room for: all may */
   hapi_geom_names names;
   hapi_links links;
   hapi_mechanism mechanism;
@@ -107,8 +114,13 @@ static inline uint32_t hapi_range_most(const hapi_cycle *cycle)
 /* Room for so many bodies more; without it the range is noted to end there. */
 bool hapi_range_has_room(hapi_nearby *nearby, uint32_t bodies);
 
+/* links.c */
 /* What is near the body: range.links. */
 void hapi_range_links(hapi_nearby *nearby, const hapi_known_body *known);
+/* The bodies that may move by themselves, but for those that the walk has met. */
+void hapi_range_note_awake(hapi_nearby *nearby);
+
+/* range.c */
 /* After its links: whether the loop can own it, beside its joints. *io: of the bodies that were
  * looked at before; grows. */
 bool hapi_range_can_own(hapi_nearby *nearby, const hapi_known_body *known, hapi_range_need *io);

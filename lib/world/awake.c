@@ -5,12 +5,16 @@
 #include "base/assert.h"
 #include "world/world.h"
 
-#define AWAKE_WAITS 16u /* a search that is in vain costs a seventh of a collision phase */
+/* A search that is in vain costs a seventh of a collision phase: after one in vain few phases go by
+ * without, after several in a row more, so that they cost a hundredth. */
+#define AWAKE_FAILURES_MOST 4u
+#define AWAKE_WAITS_MOST (1u << AWAKE_FAILURES_MOST)
 
 bool hapi_awake_begin(hapi_world *world)
 {
   hapi_awake *awake = &world->awake;
   uint32_t asleep = 0;
+  awake->failures = awake->alone ? 0 : awake->failures; /* the last one held to its end */
   awake->count = 0;
   awake->alone = false;
   if (awake->waits > 0) {
@@ -70,5 +74,6 @@ bool hapi_awake_add_partners(hapi_awake *awake, dBodyID body)
 void hapi_awake_end(hapi_awake *awake)
 {
   awake->alone = false;
-  awake->waits = AWAKE_WAITS;
+  awake->waits = AWAKE_WAITS_MOST >> (AWAKE_FAILURES_MOST - awake->failures);
+  awake->failures += awake->failures < AWAKE_FAILURES_MOST;
 }

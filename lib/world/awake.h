@@ -19,8 +19,9 @@ typedef struct hapi_world hapi_world;
 typedef struct hapi_awake {
   dBodyID bodies[HAPI_AWAKE_MOST]; /* in the order in which they were found */
   uint32_t count;
-  bool alone;     /* the contacts of this step are those of these bodies, and no others */
-  uint32_t waits; /* collision phases until it is tried again: they were too many */
+  bool alone;        /* the contacts of this step are those of these bodies, and no others */
+  uint32_t waits;    /* collision phases until it is tried again: they were too many */
+  uint32_t failures; /* in a row, up to a few */
 } hapi_awake;
 
 /* False: too many are awake, or so few sleep that it is not worth while. After a scan. */

@@ -45,6 +45,7 @@ typedef struct hapi_link {
   dBodyID body;   /* of other, or its carrier; NULL: static */
   uint32_t known; /* its entry of the body table; HAPI_NONE: static, or without memory */
   dReal box[6];   /* own's, with the reach */
+  double after_s; /* they do not touch before */
   hapi_surface surface;
   bool turned; /* the surface is of (other, own) */
   hapi_said_surface
