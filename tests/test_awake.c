@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include "tests/contact_world.h"
 #include "tests/desk.h"
 
 #define G 9.81
@@ -311,4 +312,78 @@ TEST(a_hand_feels_a_sleeping_tower_alike_whatever_sleeps_elsewhere)
     printf("# %s: %.4f N, among many %.4f N\n", hap_model_name(all_models[i]), few, many);
     CHECK(few > 4.0 && fabs(many - few) < 1e-3 * few);
   }
+}
+
+/* ---- fields of sleepers ---- */
+
+#define FIELD 7 /* cubes along x and along y */
+#define FIELD_GAP 0.045
+
+static contact_world *field_new(double gap)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  for (int i = 0; i < FIELD * FIELD; ++i) {
+    double pitch = EDGE + gap;
+    dBodyDisable(cw_add_cube(w, 0.2, EDGE, pitch * (i % FIELD), pitch * (i / FIELD), 0.5 * EDGE));
+  }
+  dWorldSetAutoDisableFlag(w->world, 1);
+  return w;
+}
+
+/* At 20 Hz a body could fall by 49 mm until the model after the next. Cubes that sleep do not: what
+ * the pushed one may come to is in the range, and no chain beyond it. */
+TEST(a_field_of_sleepers_is_not_in_the_range)
+{
+  contact_world *w = field_new(FIELD_GAP);
+  cw_start(w, -0.5 * EDGE - 0.012, 0.0, 0.5 * EDGE);
+  cw_go(w, 0.05, 0.0, 0.0, 300);
+  CHECK(w->seen.range_max >= 3 && w->seen.range_max <= 9);
+}
+
+/* Those that touch go on at once. */
+TEST(sleepers_that_touch_are_in_the_range)
+{
+  contact_world *w = field_new(0.0);
+  cw_start(w, -0.5 * EDGE - 0.012, 0.0, 0.5 * EDGE);
+  cw_go(w, 0.05, 0.0, 0.0, 300);
+  CHECK(w->seen.range_max == FIELD * FIELD);
+}
+
+/* A push goes along a row with gaps of 4 mm, as long as it takes: each is moved in time, and none
+ * goes through the next. */
+TEST(a_push_along_sleepers_arrives)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  for (int i = 0; i < 8; ++i) {
+    dBodyDisable(cw_add_cube(w, 0.2, EDGE, (EDGE + 0.004) * i, 0.0, 0.5 * EDGE));
+  }
+  cw_start(w, -0.5 * EDGE - 0.012, 0.0, 0.5 * EDGE);
+  cw_move_hand(w, 0.2, 0.0, 0.0);
+  for (int i = 0; i < 700; ++i) {
+    cw_tick(w);
+    for (int k = 1; k < 8; ++k) {
+      CHECK(w->position[k][0] - w->position[k - 1][0] > EDGE - 1e-3);
+    }
+  }
+  CHECK(w->position[7][0] > (EDGE + 0.004) * 7 + 0.01);
+}
+
+/* What is awake may come to a sleeper at any time: a heavy ball drives the pushed cube's neighbour
+ * into the next one. */
+TEST(what_flies_at_sleepers_is_in_time)
+{
+  contact_world *w = field_new(FIELD_GAP);
+  dBodyID ball = cw_add_ball(w, 2.0, 0.02, EDGE + FIELD_GAP, -0.8, 0.5 * EDGE);
+  dBodySetLinearVel(ball, 0.0, 4.0, 0.0);
+  cw_start(w, -0.5 * EDGE - 0.012, 0.0, 0.5 * EDGE);
+  cw_move_hand(w, 0.02, 0.0, 0.0);
+  double least = HUGE_VAL;
+  for (int i = 0; i < 400; ++i) {
+    cw_tick(w);
+    least = fmin(least, w->position[FIELD + 1][1] - w->position[1][1]);
+  }
+  CHECK(w->position[FIELD + 1][1] > EDGE + FIELD_GAP + 0.01);
+  CHECK_SAY(least > EDGE - 2e-3, "cubes came as near as %g m", least);
 }

@@ -298,3 +298,39 @@ TEST(what_begins_to_move_gets_its_margin)
   pass(b);
   CHECK(b->count == 4);
 }
+
+/* A cube tilted so that two of its corners are within the margin of a slow one. It begins to turn:
+ * the other two may come down before the next pass. */
+TEST(what_begins_to_turn_gets_its_margin)
+{
+  const double angle = 0.04; /* the far corners are 4 mm up */
+  bench *b = bench_new();
+  b->poses[0].quat_wxyz[0] = cos(0.5 * angle);
+  b->poses[0].quat_wxyz[2] = sin(0.5 * angle);
+  b->poses[0].position[2] = HALF + HALF * (cos(angle) + sin(angle)) - DEPTH;
+  pass_new(b);
+  pass(b);
+  CHECK(b->count == 2);
+  b->twists[0].angular[1] = -4.0;
+  pass(b);
+  CHECK(b->count == 4);
+}
+
+/* The way is in parts of the smaller one. */
+TEST(contacts_of_a_small_body_stay_for_less)
+{
+  const double half = 0.002; /* an extent of 3.5 mm: 0.17 um */
+  bench *b = bench_new();
+  hapi_patch_contact before[4];
+  hapi_v3_set(b->shapes[0].half, half, half, half);
+  b->poses[0].position[2] = HALF + half - DEPTH;
+  pass_new(b);
+  CHECK(b->count == 4);
+  memcpy(before, b->found, sizeof before);
+  b->poses[0].position[0] = 1e-7;
+  pass(b);
+  CHECK(same_contacts(b, before, 4));
+  b->poses[0].position[0] = 3e-7;
+  pass(b);
+  CHECK(!same_contacts(b, before, 4));
+}
