@@ -14,7 +14,7 @@
 
 #define PEERS_COLUMNS                                                           \
   "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode" \
-  ",iterations,peak_n,rest_mm,asleep,repeats,haptic_hz"
+  ",iterations,peak_n,rest_mm,asleep,repeats,haptic_hz,tick_us,contact_us,physics_us"
 
 #define REPEATS 5
 #define REPEATS_QUICK 3
@@ -74,6 +74,7 @@ typedef struct peers_row {
   peers_case of;
   double us_per_ms; /* medians */
   double p99_us;
+  double parts[3];  /* us a ms: ticks, contact passes, cycles; NaN: of an engine */
   double error;     /* NaN: not known */
   double error_ode; /* likewise */
   double first;     /* at the begin of the touch, of ODE's; NaN: not known */
@@ -177,19 +178,23 @@ static hap_status row_judge(bench *b, const peer_world *world, const peers_run *
 
 /* Of the medians of each tick over the repeats, which are alike: a disturbance of one of them does
  * not show. */
-static double ticks_p99(const peers_run *runs, size_t repeats)
+static double ticks_p99(const peers_run *runs, size_t repeats, double *out_mean)
 {
   double values[REPEATS];
   double *ticks = calloc(runs[0].count, sizeof *ticks);
+  *out_mean = (double)NAN;
   if (ticks == NULL) {
     return (double)NAN;
   }
+  double sum = 0.0;
   for (size_t i = 0; i < runs[0].count; ++i) {
     for (size_t n = 0; n < repeats; ++n) {
       values[n] = runs[n].tick_us[i];
     }
     ticks[i] = bench_median(values, repeats);
+    sum += ticks[i];
   }
+  *out_mean = sum / (double)runs[0].count;
   (void)bench_median(ticks, runs[0].count); /* sorts */
   double p99 = bench_quantile(ticks, runs[0].count, 0.99);
   free(ticks);
@@ -199,12 +204,19 @@ static double ticks_p99(const peers_run *runs, size_t repeats)
 static void row_note_times(peers_row *row, peers_run *runs, size_t repeats)
 {
   double us[REPEATS];
+  double parts[2][REPEATS];
+  double mean;
   for (size_t n = 0; n < repeats; ++n) {
     us[n] = runs[n].us_per_ms;
+    parts[0][n] = runs[n].parts.contact;
+    parts[1][n] = runs[n].parts.physics;
   }
   row->repeats = (int)repeats;
   row->us_per_ms = bench_median(us, repeats);
-  row->p99_us = ticks_p99(runs, repeats);
+  row->parts[1] = bench_median(parts[0], repeats);
+  row->parts[2] = bench_median(parts[1], repeats);
+  row->p99_us = ticks_p99(runs, repeats, &mean);
+  row->parts[0] = row->who->engine == NULL ? 1e-3 * row->of.haptic_hz * mean : (double)NAN;
   row->run = runs[0];
   memset(&runs[0], 0, sizeof runs[0]);
 }
@@ -247,8 +259,12 @@ static void row_write(FILE *csv, const peers_row *r)
           row_physics_hz(r), r->us_per_ms, r->p99_us);
   number_write(csv, r->error);
   number_write(csv, r->error_ode);
-  fprintf(csv, ",%d,%.5g,%.4g,%zu,%d,%g\n", iterations, peers_run_peak(&r->run), 1e3 * r->run.rest,
+  fprintf(csv, ",%d,%.5g,%.4g,%zu,%d,%g", iterations, peers_run_peak(&r->run), 1e3 * r->run.rest,
           r->run.asleep, r->repeats, r->of.haptic_hz);
+  for (int k = 0; k < 3; ++k) {
+    number_write(csv, r->parts[k]);
+  }
+  fputc('\n', csv);
 }
 
 static void error_text(double error, char *out, size_t size)

@@ -25,6 +25,7 @@ static hap_status run_create(bench *b, const peer_world *world, double tick_s, p
   memset(out, 0, sizeof *out);
   out->tick_s = tick_s;
   out->count = (size_t)lround(world->hand.seconds / tick_s);
+  out->parts.contact = out->parts.physics = (double)NAN;
   out->force = calloc(out->count, sizeof *out->force);
   out->tick_us = calloc(out->count, sizeof *out->tick_us);
   if (out->force == NULL || out->tick_us == NULL) {
@@ -112,6 +113,25 @@ hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_worl
 }
 
 /* ---- a session ---- */
+
+/* us, since the session began: contact passes, cycles. */
+static void parts_read(const hap_session *session, double out[2])
+{
+  hap_stats stats;
+  if (hap_session_stats(session, &stats, sizeof stats) < HAP_OK) {
+    out[0] = out[1] = (double)NAN;
+    return;
+  }
+  out[0] = stats.contact.us_mean * (double)stats.contact.passes;
+  out[1] = 1e3 * stats.physics.ms_mean * (double)stats.physics.steps;
+}
+
+static void parts_note(peers_run *run, const double before[2], const double after[2])
+{
+  double ms = 1e3 * run->tick_s * (double)run->count;
+  run->parts.contact = (after[0] - before[0]) / ms;
+  run->parts.physics = (after[1] - before[1]) / ms;
+}
 
 typedef struct session_bed {
   const peer_world *world;
@@ -223,11 +243,15 @@ static hap_status session_run(bench *b, session_bed *bed, peers_run *out)
     status = hap_session_trace_read(bed->session, bed->rows, out->count, sizeof *bed->rows, &got);
   }
   session_rest(bed, out);
+  double parts[2][2];
+  parts_read(bed->session, parts[0]);
   double used = bench_used_seconds();
   for (size_t i = 0; i < out->count && status >= HAP_OK; ++i) {
     status = session_tick(b, bed, settle + i, out->force[i]);
   }
   used = bench_used_seconds() - used;
+  parts_read(bed->session, parts[1]);
+  parts_note(out, parts[0], parts[1]);
   if (status >= HAP_OK) {
     status = session_times(b, bed, out);
   }

@@ -15,8 +15,12 @@ typedef struct peers_run {
   double (*force)[3]; /* N, on the hand, in each of them */
   double *tick_us;    /* us, wall clock: of each step of the engine or tick of the session */
   double us_per_ms;   /* us of processor a simulated ms, all that was done in these ticks */
-  double rest;        /* m, farthest way of a box from its begin while all settled */
-  size_t asleep;      /* boxes, at the end of settling */
+  struct {            /* us a simulated ms by the clock; of an engine NaN */
+    double contact;   /* contact passes */
+    double physics;   /* cycles: ODE's step, neighbours, range, messages */
+  } parts;
+  double rest;   /* m, farthest way of a box from its begin while all settled */
+  size_t asleep; /* boxes, at the end of settling */
 } peers_run;
 
 hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_world *world,

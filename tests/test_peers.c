@@ -185,6 +185,8 @@ TEST(first_forces_are_alike)
   REQUIRE(peers_run_session(&b, &world, &session, &run) >= HAP_OK);
   CHECK_NEAR(peers_run_first(&world, &run), wanted, 0.1 * wanted);
   CHECK(peers_run_error(&run, &ode) < 0.02);
+  CHECK(run.parts.contact > 0.0 && run.parts.physics > 0.0);
+  CHECK(isnan(ode.parts.contact) && isnan(ode.parts.physics));
   CHECK(run.asleep == 0 && run.us_per_ms > 0.0);
   peers_run_free(&run);
   for (size_t i = 1; peer_engine_at(i) != NULL; ++i) {
@@ -219,7 +221,7 @@ TEST(boxes_sleep_where_they_may)
 
 #define COLUMNS                                                                             \
   "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode,iterations," \
-  "peak_n,rest_mm,asleep,repeats,haptic_hz\n"
+  "peak_n,rest_mm,asleep,repeats,haptic_hz,tick_us,contact_us,physics_us\n"
 
 TEST(the_program_leaves_its_table)
 {
