@@ -93,7 +93,7 @@ static void near_put(bench *b)
 }
 
 /* One pass with the bodies where they are. */
-static void pass(bench *b)
+static void pass_run(bench *b)
 {
   hapi_poses *poses = hapi_exchange_poses_back(b->exchange);
   poses->model_number = b->model;
@@ -113,7 +113,7 @@ static void pass(bench *b)
 static void pass_new(bench *b)
 {
   near_put(b);
-  pass(b);
+  pass_run(b);
 }
 
 static bool same_contacts(const bench *b, const hapi_patch_contact *before, uint32_t count)
@@ -139,10 +139,10 @@ TEST(contacts_stay_for_two_micrometres)
   CHECK(b->count == 4);
   memcpy(before, b->found, sizeof before);
   b->poses[0].position[0] = 1.5e-6;
-  pass(b);
+  pass_run(b);
   CHECK(same_contacts(b, before, 4));
   b->poses[0].position[0] = 2.5e-6;
-  pass(b);
+  pass_run(b);
   CHECK(!same_contacts(b, before, 4));
   CHECK(b->count == 4);
 }
@@ -157,7 +157,7 @@ TEST(a_creeping_body_is_found_anew)
     hapi_patch_contact before[4];
     memcpy(before, b->found, sizeof before);
     b->poses[0].position[0] = 1e-6 * i;
-    pass(b);
+    pass_run(b);
     CHECK(b->count == 4);
     changes += !same_contacts(b, before, 4);
     for (uint32_t k = 0; k < b->count; ++k) { /* where the cubes overlap along x */
@@ -178,7 +178,7 @@ TEST(a_small_turn_is_a_motion_of_the_corners)
   for (int i = 0; i < 2; ++i) {
     b->poses[0].quat_wxyz[0] = cos(0.5 * angles[i]);
     b->poses[0].quat_wxyz[3] = sin(0.5 * angles[i]);
-    pass(b);
+    pass_run(b);
     CHECK(same_contacts(b, before, 4) == (i == 0));
   }
 }
@@ -197,7 +197,7 @@ TEST(bodies_that_go_together_keep_their_contacts)
     if (i % 3 == 0) {
       near_put(b);
     }
-    pass(b);
+    pass_run(b);
     CHECK(same_contacts(b, before, 4));
   }
 }
@@ -211,10 +211,10 @@ TEST(a_body_on_the_static_world_is_seen_to_move)
   CHECK(b->count == 4);
   memcpy(before, b->found, sizeof before);
   b->poses[0].position[1] = 1e-6;
-  pass(b);
+  pass_run(b);
   CHECK(same_contacts(b, before, 4));
   b->poses[0].position[1] = 0.01;
-  pass(b);
+  pass_run(b);
   CHECK(b->count == 4);
   CHECK(!same_contacts(b, before, 4));
 }
@@ -251,7 +251,7 @@ TEST(crossed_edges_that_turn_over_keep_their_side)
   for (int i = 0; i < 40; ++i) {
     double along[3];
     world_turn(b, about_x, 0.1);
-    pass(b);
+    pass_run(b);
     CHECK(b->count == 1);
     CHECK(b->found[0].touch == HAPI_TOUCH_EDGES);
     hapi_v3_sub(b->poses[0].position, b->poses[1].position, along);
@@ -278,7 +278,7 @@ TEST(what_comes_near_is_found_in_time)
       near_put(b);
       for (; gap > -2.0 * step; gap -= step) {
         b->poses[0].position[2] = HALF + low + gap;
-        pass(b);
+        pass_run(b);
         CHECK(b->count > 0 || gap > 1e-3 + 1.2 * step);
         CHECK(b->count == 0 || gap < 3e-3 + 2.2 * step);
       }
@@ -292,10 +292,10 @@ TEST(what_begins_to_move_gets_its_margin)
   bench *b = bench_new();
   b->poses[0].position[2] = 2.0 * HALF + 4e-3;
   pass_new(b);
-  pass(b);
+  pass_run(b);
   CHECK(b->count == 0);
   b->twists[0].linear[2] = -0.5;
-  pass(b);
+  pass_run(b);
   CHECK(b->count == 4);
 }
 
@@ -309,10 +309,10 @@ TEST(what_begins_to_turn_gets_its_margin)
   b->poses[0].quat_wxyz[2] = sin(0.5 * angle);
   b->poses[0].position[2] = HALF + HALF * (cos(angle) + sin(angle)) - DEPTH;
   pass_new(b);
-  pass(b);
+  pass_run(b);
   CHECK(b->count == 2);
   b->twists[0].angular[1] = -4.0;
-  pass(b);
+  pass_run(b);
   CHECK(b->count == 4);
 }
 
@@ -328,9 +328,9 @@ TEST(contacts_of_a_small_body_stay_for_less)
   CHECK(b->count == 4);
   memcpy(before, b->found, sizeof before);
   b->poses[0].position[0] = 1e-7;
-  pass(b);
+  pass_run(b);
   CHECK(same_contacts(b, before, 4));
   b->poses[0].position[0] = 3e-7;
-  pass(b);
+  pass_run(b);
   CHECK(!same_contacts(b, before, 4));
 }

@@ -14,14 +14,15 @@
 /* How far two bodies may go against each other, in parts of the smaller one's extent and in all,
  * until what was found between them is found anew.
  *
- * A contact is fixed in the frames of its two bodies, and a tick places it there where they are,
- * gap and normal right to first order, as between two passes. What goes stale is where the border of
- * a face cuts the other one: of a corner that has left the face, or come over it, the lever is
- * wrong by as much as the bodies have gone, and where an edge runs along the border by up to five
- * times as much (LEAST_SINE in patch_add.c). A cube's lever is half an edge, 0.58 of its extent: 5e-5
- * of the extent is 1e-4 of the lever, 5e-4 at worst. Errors do not add up, as the way counts from
+ * A contact is fixed in the frames of its two bodies. A tick places it where the bodies are, gap
+ * and normal right to first order, as between two passes. What goes stale is where the border of a
+ * face cuts the other face. Of a corner that has left the face, or come over it, the lever is wrong
+ * by as much as the bodies have gone, and where an edge runs along the border by up to five times
+ * as much (LEAST_SINE in patch_add.c). A cube's lever is half an edge, 0.58 of its extent: 5e-5 of
+ * the extent is 1e-4 of the lever, 5e-4 at worst. Errors do not add up, as the way counts from
  * where the contacts were found. Gaps are wrong by way^2 / lever, less than a nanometre. Ten times
- * as much would be as good for the levers, but in a dense pile that slips, other bricks would stick. */
+ * as much would be as good for the levers, but in a dense pile that slips, other bricks would
+ * stick. */
 #define HAPI_KEPT_SHARE 5e-5
 #define HAPI_KEPT_WAY 2e-6 /* m */
 

@@ -41,9 +41,9 @@ void hapi_places_begin(hapi_places *places)
 
 /* ---- what follows from geoms alone ---- */
 
-/* Poses and corners in the frame of a body come from those in the world, and have other last bits in
- * each message. Whole steps of a nanometre are the same, but where a value is between two of them:
- * then the contacts are found anew. */
+/* Poses and corners in the frame of a body come from those in the world, and have other last bits
+ * in each message. Whole steps of a nanometre are the same, but where a value is between two of
+ * them: then the contacts are found anew. */
 static uint64_t hash_steps(uint64_t hash, const double *values, int count)
 {
   for (int i = 0; i < count; ++i) {
