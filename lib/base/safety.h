@@ -137,6 +137,11 @@
 #define HAPI_SAFETY_UNWOKEN_S 0.1     /* s */
 #define HAPI_SAFETY_STOP_WAIT_S 1.0   /* s */
 
+/* ---- a device that a thread talks to ---- */
+#define HAPI_SAFETY_SILENT_S 0.01   /* s */
+#define HAPI_SAFETY_LOST_S 0.06     /* s */
+#define HAPI_SAFETY_UNWRITTEN_S 0.1 /* s */
+
 /* ---- the SPIDAR's guard process ---- */
 #define HAPI_SAFETY_GUARD_LOOK_S 0.02  /* s */
 #define HAPI_SAFETY_GUARD_STALL_S 0.5  /* s */
