@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
 """with_emulator.py [--todo POINT] EMULATOR [ARGUMENTS] -- HAPODE_RUN --check-device...: checks a
-device while the spidar-emulator runs; {port} in the words becomes the emulated port. Exit status:
+device while an emulator runs; {port} in the words becomes the port that it prints. Exit status:
 that of the check. POINT is one that is known to be off, and must be.
 
 Both live in real time. Where SCHED_FIFO is not allowed and the machine is busy, a tick that is

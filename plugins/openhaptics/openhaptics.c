@@ -62,6 +62,7 @@ typedef struct hd_device {
   /* The scheduler's thread. */
   atomic_bool ending;
   atomic_bool ended;
+  atomic_bool inside; /* of a callback: the library's scheduler waits for its end, and so would we */
   int failures;
   int complaint; /* hd_cause; 0: none */
   int64_t complaint_ns;
@@ -145,17 +146,11 @@ static bool errors_take(hd_device *device, int64_t now_ns)
   return !failed;
 }
 
-static unsigned int scheduler_tick(void *user)
+static void frame_run(hd_device *device)
 {
-  hd_device *device = user;
   hapi_relay_sample sample;
   hap_wrench wanted;
   memset(&sample, 0, sizeof sample);
-  if (atomic_load(&device->ended)) {
-    return HAPI_HD_DONE;
-  }
-  /* Read before the zero goes out: whoever sees the end knows that a zero was the last. */
-  bool ending = atomic_load(&device->ending);
   device->hd.begin_frame(device->handle);
   int64_t now_ns = hapi_clock_now();
   sample.stamp_ns = now_ns;
@@ -173,9 +168,22 @@ static unsigned int scheduler_tick(void *user)
   if (errors_take(device, now_ns)) {
     (void)hapi_relay_publish(&device->relay, &sample);
   }
+}
+
+static unsigned int scheduler_tick(void *user)
+{
+  hd_device *device = user;
+  if (atomic_load(&device->ended)) {
+    return HAPI_HD_DONE;
+  }
+  atomic_store(&device->inside, true);
+  /* Read before the zero goes out: whoever sees the end knows that a zero was the last. */
+  bool ending = atomic_load(&device->ending);
+  frame_run(device);
   if (ending) {
     atomic_store(&device->ended, true);
   }
+  atomic_store(&device->inside, false);
   return ending ? HAPI_HD_DONE : HAPI_HD_CONTINUE;
 }
 
@@ -350,45 +358,46 @@ static void hd_describe(void *self, uint32_t effector, hap_device_info *out)
 
 /* ---- start and stop ---- */
 
-/* The scheduler's last word: a zero. Where it does not come, the zero goes out from here. */
-static bool callback_end(hd_device *device)
+static void zero_from_here(hd_device *device)
+{
+  const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  (void)errors_drop(device);
+  device->hd.begin_frame(device->handle);
+  wrench_set(device, &none);
+  device->hd.end_frame(device->handle);
+  if (errors_drop(device) == HAPI_HD_SUCCESS) {
+    (void)hapi_relay_sent(&device->relay, &none);
+  }
+}
+
+/* The scheduler's last word is a zero; where that does not come, the zero goes out from here.
+ * False: the scheduler is stuck in a call of the library, which would not let us in either. */
+static bool hd_rest(hd_device *device)
 {
   int64_t end = hapi_clock_now() + (int64_t)(1e9 * REST_WAIT_S);
   hapi_relay_zero(&device->relay);
+  hapi_relay_stop(&device->relay);
   if (!device->scheduled) {
-    hapi_relay_stop(&device->relay);
     return true;
   }
   atomic_store(&device->ending, true);
   while (!atomic_load(&device->ended) && hapi_clock_now() < end) {
     hapi_clock_sleep_until(hapi_clock_now() + LOOK_NS);
   }
-  bool ended = atomic_load(&device->ended);
+  if (!atomic_load(&device->ended) && atomic_load(&device->inside)) {
+    return false;
+  }
+  bool said_zero = atomic_exchange(&device->ended, true);
   device->hd.unschedule(device->callback);
   hapi_hd_scheduler_end(&device->hd);
   device->scheduled = false;
-  atomic_store(&device->ended, true);
-  return ended;
-}
-
-static void hd_rest(hd_device *device)
-{
-  const hap_wrench none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
-  bool was_scheduled = device->scheduled;
-  if (!callback_end(device)) {
-    device->hd.begin_frame(device->handle);
-    wrench_set(device, &none);
-    device->hd.end_frame(device->handle);
-    if (errors_drop(device) == HAPI_HD_SUCCESS) {
-      (void)hapi_relay_sent(&device->relay, &none);
-    }
+  if (!said_zero) {
+    zero_from_here(device);
   }
-  if (was_scheduled && device->open) {
-    device->hd.make_current(device->handle);
-    device->hd.disable(HAPI_HD_FORCE_OUTPUT);
-    (void)errors_drop(device);
-  }
-  hapi_relay_stop(&device->relay);
+  device->hd.make_current(device->handle);
+  device->hd.disable(HAPI_HD_FORCE_OUTPUT);
+  (void)errors_drop(device);
+  return true;
 }
 
 static hap_status start_fail(hd_device *device, int cause)
@@ -425,7 +434,9 @@ static hap_status hd_start(void *self)
 {
   hd_device *device = self;
   bool lost = hapi_relay_cause_now(&device->relay) == HD_LOST;
-  hd_rest(device);
+  if (!hd_rest(device)) {
+    return start_fail(device, HD_STUCK);
+  }
   if (lost && device->open) {
     device->hd.disable_device(device->handle);
     device->open = false;
@@ -446,7 +457,7 @@ static hap_status hd_start(void *self)
   callback_begin(device);
   if (!first_awaited(device)) {
     int cause = hapi_relay_cause_now(&device->relay) == HD_LOST ? HD_LOST : HD_NO_POSITION;
-    hd_rest(device);
+    (void)hd_rest(device);
     return start_fail(device, cause);
   }
   return HAP_OK;
@@ -455,8 +466,10 @@ static hap_status hd_start(void *self)
 static void hd_stop(void *self)
 {
   hd_device *device = self;
-  hd_rest(device);
-  if (!hapi_relay_is_resting(&device->relay)) {
+  if (!hd_rest(device)) {
+    hapi_log(HAP_LOG_ERROR, "openhaptics: a call of libHD does not come back: switch %s off",
+             device->figures.name);
+  } else if (!hapi_relay_is_resting(&device->relay)) {
     hapi_log(HAP_LOG_ERROR, "openhaptics: %s did not take zero force: switch it off",
              device->figures.name);
   }
@@ -465,8 +478,9 @@ static void hd_stop(void *self)
 static void hd_close(void *self)
 {
   hd_device *device = self;
-  hd_rest(device);
-  hd_free(device);
+  if (hd_rest(device)) {
+    hd_free(device);
+  }
 }
 
 /* ---- every tick ---- */
@@ -517,6 +531,8 @@ static const char *cause_text(int cause)
       return "the scheduler of libHD gave no position within a second";
     case HD_NO_SCHEDULER:
       return "more than 64 devices run";
+    case HD_STUCK:
+      return "a call of libHD does not come back: switch the device off and on";
     default:
       return NULL;
   }
