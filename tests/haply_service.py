@@ -56,6 +56,7 @@ class Service:
         self.pongs = 0
         self.bad = 0  # commands that are not the protocol's, frames without a mask
         self.clients = set()
+        self.tasks = set()
         self.server = None
         self.port = 0
 
@@ -119,8 +120,6 @@ class Service:
     async def send_state(self, writer, first=False):
         if self.fault == "silent":
             return
-        if self.late > 0.0:
-            await asyncio.sleep(self.late)
         payload = self.text(first).encode()
         if self.fault == "bytes":
             writer.write(os.urandom(64))
@@ -133,6 +132,13 @@ class Service:
         else:
             writer.write(frame(TEXT, payload))
         await writer.drain()
+
+    async def send_late(self, writer):
+        await asyncio.sleep(self.late)
+        try:
+            await self.send_state(writer)
+        except ConnectionError:
+            pass
 
     async def send_split(self, writer, payload):
         """Three fragments, a ping between them, byte by byte at their begins."""
@@ -205,9 +211,14 @@ class Service:
                     self.pongs += 1
                 if opcode == TEXT:
                     self.command(payload)
+                    if self.late > 0.0:  # forces are taken meanwhile
+                        later = asyncio.create_task(self.send_late(writer))
+                        self.tasks.add(later)
+                        later.add_done_callback(self.tasks.discard)
+                        continue
                     await asyncio.sleep(0.0005)
                     await self.send_state(writer)
-        except (ConnectionError, asyncio.IncompleteReadError):
+        except (ConnectionError, asyncio.IncompleteReadError, asyncio.CancelledError):
             pass
         finally:
             self.clients.discard(writer)

@@ -28,7 +28,6 @@
 #define ASK_NS 100000000LL    /* an answer that stays away is asked for once more */
 #define MAX_FORCE 4.0         /* N: the service does not say; the arm gives more for a moment */
 #define ZERO_WAIT_NS 50000000LL
-#define GARBAGE_MOST 20 /* messages in a row: it speaks something else */
 #define HOST_ROOM 104
 
 typedef enum haply_cause {
@@ -55,11 +54,11 @@ typedef struct haply_device {
   atomic_bool ending;
   bool due;        /* a state has come since the last command */
   bool zero_last;  /* the last command was a zero */
-  int garbage;     /* messages in a row */
   int64_t sent_ns; /* the last command */
   /* Of open: what came so far. */
   hapi_haply_state first;
   bool first_good;
+  int first_count; /* messages */
 } haply_device;
 
 static hapi_websocket_place place_of(const haply_device *device)
@@ -68,14 +67,6 @@ static hapi_websocket_place place_of(const haply_device *device)
 }
 
 /* ---- the carrier ---- */
-
-static void garbage_note(haply_device *device)
-{
-  hapi_relay_set_doubt(&device->relay, HAPLY_GARBAGE);
-  if (++device->garbage >= GARBAGE_MOST) {
-    hapi_relay_set_cause(&device->relay, HAPLY_BROKEN);
-  }
-}
 
 static void state_publish(haply_device *device, const hapi_haply_state *state)
 {
@@ -100,10 +91,9 @@ static void message_take(void *user, const char *text, size_t length)
   hapi_haply_state state;
   device->due = true;
   if (!hapi_haply_read(text, length, &device->wish, &state)) {
-    garbage_note(device);
+    hapi_relay_set_doubt(&device->relay, HAPLY_GARBAGE);
     return;
   }
-  device->garbage = 0;
   state_publish(device, &state);
 }
 
@@ -203,7 +193,7 @@ static void first_take(void *user, const char *text, size_t length)
 {
   haply_device *device = user;
   hapi_haply_state state;
-  ++device->garbage;
+  ++device->first_count;
   if (hapi_haply_read(text, length, &device->wish, &state) && state.has_arms) {
     device->first = state;
     device->first_good = true;
@@ -238,7 +228,7 @@ static hap_status service_ask(haply_device *device, hap_detail *detail)
                      "haply: the service at %.100s:%u %s: it may be another version; update "
                      "Haply's Inverse Service to 3.1 or later",
                      device->host, device->port,
-                     device->garbage > 0 ? "sends messages without a list 'inverse3'"
+                     device->first_count > 0 ? "sends messages without a list 'inverse3'"
                                          : "sends nothing");
   }
   return HAP_OK;
@@ -424,7 +414,6 @@ static hap_status haply_start(void *self)
   }
   device->due = true;
   device->zero_last = false;
-  device->garbage = 0;
   atomic_store(&device->ending, false);
   if (hapi_thread_start(&device->thread, carrier_main, device, "hapode-haply", PRIORITY) <
       HAP_OK) {

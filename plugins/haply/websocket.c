@@ -75,7 +75,7 @@ bool hapi_websocket_send(hapi_websocket *ws, const char *text, size_t length)
 
 #define ANSWER_MOST 4096
 #define RECEIVE_MOST 262144 /* bytes in one call, so that a flood does not keep it */
-#define CLOSE_WAIT_NS 50000000LL
+#define CLOSE_WAIT_NS 100000000LL
 
 struct hapi_websocket {
   int fd;
@@ -188,20 +188,34 @@ hapi_websocket *hapi_websocket_adopt(int fd)
   return ws;
 }
 
+/* Until the other side has closed, too: closed with bytes unread, the connection would be reset,
+ * and what was sent last, a zero, might be lost. */
+static void socket_drain(int fd, int64_t end_ns)
+{
+  char bytes[1024];
+  ssize_t got = 1;
+  (void)shutdown(fd, SHUT_WR);
+  while (got != 0 && hapi_clock_now() < end_ns) {
+    struct pollfd readable = {fd, POLLIN, 0};
+    got = poll(&readable, 1, 5) > 0 ? recv(fd, bytes, sizeof bytes, 0) : 1;
+    got = got < 0 && errno != EAGAIN && errno != EINTR ? 0 : got;
+  }
+}
+
 void hapi_websocket_close(hapi_websocket *ws)
 {
   if (ws == NULL) {
     return;
   }
-  int64_t end = hapi_clock_now() + CLOSE_WAIT_NS;
+  int64_t end_ns = hapi_clock_now() + CLOSE_WAIT_NS;
   (void)wslay_event_queue_close(ws->context, WSLAY_CODE_NORMAL_CLOSURE, NULL, 0);
   while (!ws->failed && wslay_event_want_write(ws->context) && wslay_event_send(ws->context) == 0 &&
-         wslay_event_want_write(ws->context) && hapi_clock_now() < end) {
+         wslay_event_want_write(ws->context) && hapi_clock_now() < end_ns) {
     struct pollfd writable = {ws->fd, POLLOUT, 0};
     (void)poll(&writable, 1, 5);
   }
   wslay_event_context_free(ws->context);
-  (void)shutdown(ws->fd, SHUT_WR); /* what was sent still arrives */
+  socket_drain(ws->fd, end_ns);
   close(ws->fd);
   hapi_free(ws);
 }

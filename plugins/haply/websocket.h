@@ -37,7 +37,7 @@ HAP_NODISCARD hap_status hapi_websocket_open(const hapi_websocket_place *place, 
  * built without libwslay. */
 hapi_websocket *hapi_websocket_adopt(int fd);
 
-/* Sends a close and frees. NULL is allowed. Waits at most 50 ms for what is still to be sent. */
+/* Sends a close and frees. NULL is allowed. Waits at most 100 ms until all has arrived. */
 void hapi_websocket_close(hapi_websocket *ws);
 
 /* Waits until there is something to read, at most ms. */

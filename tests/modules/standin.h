@@ -56,6 +56,6 @@ typedef struct standin {
 } standin;
 
 /* A stand-in exports this. */
-standin *standin_get(void);
+__attribute__((visibility("default"))) standin *standin_get(void);
 
 #endif

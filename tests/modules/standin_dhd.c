@@ -30,7 +30,6 @@ STANDIN_CALL const char *dhdGetSystemName(char id);
 STANDIN_CALL double dhdGetMaxForce(char id);
 STANDIN_CALL int dhdGetStatus(int status[16], char id);
 STANDIN_CALL const char *dhdErrorGetLastStr(void);
-STANDIN_CALL standin *standin_get(void);
 
 static const char *last_error = "no error";
 static atomic_int inside; /* calls about positions and forces */

@@ -40,7 +40,6 @@ STANDIN_CALL void hdUnschedule(HDSchedulerHandle handle);
 STANDIN_CALL void hdStartScheduler(void);
 STANDIN_CALL void hdStopScheduler(void);
 STANDIN_CALL unsigned int hdCheckCalibration(void);
-STANDIN_CALL standin *standin_get(void);
 
 #define CALLBACKS 8
 #define ERRORS 16
