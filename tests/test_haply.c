@@ -58,8 +58,8 @@ TEST(each_axis_has_its_sign)
   device_rig *r = rig_new(service_spec(s, SLOW));
   for (int axis = 0; axis < 3; ++axis) {
     char command[80];
-    snprintf(command, sizeof command, "at %g %g %g", axis == 0 ? 0.02 : 0.0,
-             axis == 1 ? 0.02 : 0.0, axis == 2 ? 0.02 : 0.0);
+    snprintf(command, sizeof command, "at %g %g %g", axis == 0 ? 0.02 : 0.0, axis == 1 ? 0.02 : 0.0,
+             axis == 2 ? 0.02 : 0.0);
     service_tell(s, command);
     hap_device_input in = read_settled(r);
     for (int i = 0; i < 3; ++i) {
@@ -417,11 +417,10 @@ static const char *const good_json[] = {
 };
 
 static const char *const bad_json[] = {
-    "",       "{",        "[1,]",      "[,1]",     "{\"a\"}",    "{\"a\":}",   "{\"a\":1,}",
-    "[1 2]",  "01",       "1.",        ".5",       "+1",         "1e",         "nan",
-    "NaN",    "Infinity", "-",         "0x10",     "1,5",        "tru",        "truex",
-    "\"a",    "\"\\x\"",  "\"\\u12\"", "\"a\nb\"", "{a:1}",      "{\"a\" 1}",  "[1]]",
-    "[1}",    "{1:2}",    "1e999",     "nul",      "[\"a\":1]",  "{\"a\",1}",  "1 1",
+    "",     "{",   "[1,]",  "[,1]",  "{\"a\"}", "{\"a\":}",  "{\"a\":1,}", "[1 2]", "01",
+    "1.",   ".5",  "+1",    "1e",    "nan",     "NaN",       "Infinity",   "-",     "0x10",
+    "1,5",  "tru", "truex", "\"a",   "\"\\x\"", "\"\\u12\"", "\"a\nb\"",   "{a:1}", "{\"a\" 1}",
+    "[1]]", "[1}", "{1:2}", "1e999", "nul",     "[\"a\":1]", "{\"a\",1}",  "1 1",
 };
 
 TEST(json_is_read_strictly)
@@ -471,8 +470,9 @@ TEST(a_force_is_written_as_the_service_reads_it)
   const double force[3] = {0.5, -1e-9, 12.0};
   size_t length = hapi_haply_write_force("04BA", force, text);
   CHECK(length == strlen(text));
-  CHECK(strcmp(text, "{\"inverse3\":[{\"device_id\":\"04BA\",\"commands\":{\"set_cursor_force\":{"
-                     "\"values\":{\"x\":0.5,\"y\":-1e-09,\"z\":12}}}}]}") == 0);
+  CHECK(strcmp(text,
+               "{\"inverse3\":[{\"device_id\":\"04BA\",\"commands\":{\"set_cursor_force\":{"
+               "\"values\":{\"x\":0.5,\"y\":-1e-09,\"z\":12}}}}]}") == 0);
 }
 
 /* ---- the tick ---- */

@@ -6,12 +6,12 @@
 
 #include "tests/tap.h"
 
+#include <fcntl.h>
 #include <locale.h>
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <fcntl.h>
 #include <unistd.h>
 
 #include "base/safety.h"
@@ -182,10 +182,10 @@ TEST(buttons_are_told)
 typedef struct vendor_fault {
   const char *name;
   vendor which;
-  int fault;          /* standin_fault */
-  const char *says;   /* the session's text */
-  bool reaches;       /* a zero can go out while the fault is there */
-  bool restart;       /* it needs one to come back */
+  int fault;        /* standin_fault */
+  const char *says; /* the session's text */
+  bool reaches;     /* a zero can go out while the fault is there */
+  bool restart;     /* it needs one to come back */
 } vendor_fault;
 
 static const vendor_fault vendor_faults[] = {
@@ -249,7 +249,8 @@ static double fault_run(const vendor_fault *row)
   CHECK(pressed_says(p, row->says));
   atomic_store(&it->of[0].fault, STANDIN_WELL);
   if (!row->restart) {
-    CHECK(pressed_await(vendor_is_let_go, it)); /* before a reset: the first that goes out is zero */
+    CHECK(
+        pressed_await(vendor_is_let_go, it)); /* before a reset: the first that goes out is zero */
   }
   CHECK(pressed_await(is_pushed_again, &pair));
   tap_release(p);
@@ -393,35 +394,79 @@ TEST(a_process_that_ends_by_itself_leaves_zero)
 typedef struct refusal {
   const char *name;
   vendor which;
-  int fault;         /* of the stand-in */
-  const char *rest;  /* of the spec, behind the library */
-  const char *spec;  /* instead of all that; NULL */
+  int fault;        /* of the stand-in */
+  const char *rest; /* of the spec, behind the library */
+  const char *spec; /* instead of all that; NULL */
   const char *says[3];
 } refusal;
 
 static const refusal refusals[] = {
-    {"no_library_of_dhd", VENDOR_DHD, 0, NULL, "forcedimension",
+    {"no_library_of_dhd",
+     VENDOR_DHD,
+     0,
+     NULL,
+     "forcedimension",
      {"libdhd.so.3", "LD_LIBRARY_PATH", "install the Force Dimension SDK"}},
-    {"no_library_of_hd", VENDOR_HD, 0, NULL, "openhaptics",
+    {"no_library_of_hd",
+     VENDOR_HD,
+     0,
+     NULL,
+     "openhaptics",
      {"libHD.so.3", "LD_LIBRARY_PATH", "Touch_Setup"}},
-    {"a_library_that_is_not_there", VENDOR_DHD, 0, NULL, "forcedimension:library=/no/such.so",
+    {"a_library_that_is_not_there",
+     VENDOR_DHD,
+     0,
+     NULL,
+     "forcedimension:library=/no/such.so",
      {"/no/such.so", "is not there", "whole path"}},
-    {"a_library_without_a_path", VENDOR_HD, 0, NULL, "openhaptics:library=libHD.so",
+    {"a_library_without_a_path",
+     VENDOR_HD,
+     0,
+     NULL,
+     "openhaptics:library=libHD.so",
      {"libHD.so", "is not there", "whole path"}},
-    {"a_library_that_is_a_text", VENDOR_DHD, 0, NULL, "forcedimension:library=/etc/passwd",
+    {"a_library_that_is_a_text",
+     VENDOR_DHD,
+     0,
+     NULL,
+     "forcedimension:library=/etc/passwd",
      {"does not load", "/etc/passwd", "install it again"}},
-    {"no_device_of_dhd", VENDOR_DHD, STANDIN_NOT_THERE, "", NULL,
+    {"no_device_of_dhd",
+     VENDOR_DHD,
+     STANDIN_NOT_THERE,
+     "",
+     NULL,
      {"no device on USB", "switched on", "60-hapode-forcedimension.rules"}},
-    {"no_device_of_hd", VENDOR_HD, STANDIN_NOT_THERE, "", NULL,
+    {"no_device_of_hd",
+     VENDOR_HD,
+     STANDIN_NOT_THERE,
+     "",
+     NULL,
      {"Touch_Setup", "dialout", "0x302"}},
-    {"a_device_of_dhd_with_another_number", VENDOR_DHD, 0, ",id=7", NULL,
+    {"a_device_of_dhd_with_another_number",
+     VENDOR_DHD,
+     0,
+     ",id=7",
+     NULL,
      {"device 7", "does not open", "another program"}},
-    {"a_device_of_hd_with_another_name", VENDOR_HD, 0, ",name=Right", NULL,
+    {"a_device_of_hd_with_another_name",
+     VENDOR_HD,
+     0,
+     ",name=Right",
+     NULL,
      {"'Right'", "does not open", "Touch_Setup"}},
-    {"a_device_of_hd_in_use", VENDOR_HD, STANDIN_IN_USE, "", NULL,
+    {"a_device_of_hd_in_use",
+     VENDOR_HD,
+     STANDIN_IN_USE,
+     "",
+     NULL,
      {"in use already", "name=", "0x301"}},
     {"half_a_number", VENDOR_DHD, 0, ",id=0.5", NULL, {"id", "whole number", "0.5"}},
-    {"times_that_contradict", VENDOR_HD, 0, ",stale=0.5,timeout=0.1", NULL,
+    {"times_that_contradict",
+     VENDOR_HD,
+     0,
+     ",stale=0.5,timeout=0.1",
+     NULL,
      {"stale", "less than timeout", "0.5"}},
     {"a_decimal_comma", VENDOR_DHD, 0, ",max_force=1,5", NULL, {"'5'", "max_force", "known"}},
 };

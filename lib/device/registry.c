@@ -15,9 +15,9 @@ extern const hap_device_ops hapi_forcedimension_ops;
 extern const hap_device_ops hapi_openhaptics_ops;
 
 /* A list and not self-registration: constructors would be lost in a static library. */
-static const hap_device_ops *const built_in[] = {
-    &hapi_virtual_ops, &hapi_replay_ops,         &hapi_spidar_ops,
-    &hapi_haply_ops,   &hapi_forcedimension_ops, &hapi_openhaptics_ops};
+static const hap_device_ops *const built_in[] = {&hapi_virtual_ops,        &hapi_replay_ops,
+                                                 &hapi_spidar_ops,         &hapi_haply_ops,
+                                                 &hapi_forcedimension_ops, &hapi_openhaptics_ops};
 
 const hap_device_ops *hapi_registry_at(size_t index)
 {

@@ -15,12 +15,18 @@
 #define RUNNING_MAX 64
 #define EXIT_WAIT_NS 100000000LL
 #define EXIT_LOOK_NS 500000LL
-#define SPIN_S 0.004        /* over which an orientation's difference is taken */
-#define SPIN_OLD_S 0.05     /* after a longer gap it begins anew */
-#define LENGTH_OFF 0.01     /* of a quaternion */
-#define TORQUE_NONE 1e-9    /* N m: see hapi_relay_take_arguments */
+#define SPIN_S 0.004     /* over which an orientation's difference is taken */
+#define SPIN_OLD_S 0.05  /* after a longer gap it begins anew */
+#define LENGTH_OFF 0.01  /* of a quaternion */
+#define TORQUE_NONE 1e-9 /* N m: see hapi_relay_take_arguments */
 
-enum argument { MAX_FORCE, MAX_TORQUE, STALE, TIMEOUT, TURN };
+enum argument {
+  MAX_FORCE,
+  MAX_TORQUE,
+  STALE,
+  TIMEOUT,
+  TURN
+};
 
 /* ---- arguments ---- */
 
@@ -44,8 +50,8 @@ hap_status hapi_relay_take_arguments(const hapi_argument_table *table, const hap
                                      hapi_relay_settings *out, hap_detail *detail)
 {
   out->stale = given[STALE].given ? given[STALE].number[0] : HAPI_SAFETY_SILENT_S;
-  out->lost = given[TIMEOUT].given ? given[TIMEOUT].number[0]
-                                   : fmax(HAPI_SAFETY_LOST_S, 2.0 * out->stale);
+  out->lost =
+      given[TIMEOUT].given ? given[TIMEOUT].number[0] : fmax(HAPI_SAFETY_LOST_S, 2.0 * out->stale);
   if (out->stale >= out->lost) {
     return hapi_arguments_fail(table, &given[given[STALE].given ? STALE : TIMEOUT], detail);
   }

@@ -24,7 +24,7 @@
 typedef struct hapi_relay_sample {
   int64_t stamp_ns; /* CLOCK_MONOTONIC, of its arrival */
   uint32_t buttons;
-  hap_pose pose;     /* quaternion of about unit length */
+  hap_pose pose;      /* quaternion of about unit length */
   double velocity[3]; /* m/s */
 } hapi_relay_sample;
 
@@ -59,9 +59,9 @@ typedef struct hapi_relay_tick {
 
 /* A carrier's side of it. */
 typedef struct hapi_relay_carrier {
-  int64_t fresh_ns;   /* when the newest command was found */
-  hap_wrench sent;    /* last */
-  int64_t anchor_ns;  /* of the orientation from which the spin is counted; 0: none */
+  int64_t fresh_ns;  /* when the newest command was found */
+  hap_wrench sent;   /* last */
+  int64_t anchor_ns; /* of the orientation from which the spin is counted; 0: none */
   double anchor[4];
   double spin[3];
 } hapi_relay_carrier;

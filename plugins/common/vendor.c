@@ -89,7 +89,8 @@ hap_status hapi_vendor_load(const hapi_vendor *vendor, const char *path, void **
   HAPI_TRY(library_load(vendor, path, out_library, detail));
   for (size_t i = 0; i < vendor->count; ++i) {
     void *symbol = dlsym(*out_library, vendor->symbols[i].name);
-    _Static_assert(sizeof symbol == sizeof out_functions[0], "POSIX: dlsym gives functions as well");
+    _Static_assert(sizeof symbol == sizeof out_functions[0],
+                   "POSIX: dlsym gives functions as well");
     if (symbol == NULL && vendor->symbols[i].needed) {
       hapi_vendor_unload(*out_library);
       *out_library = NULL;

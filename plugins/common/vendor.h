@@ -19,8 +19,8 @@ typedef struct hapi_vendor_symbol {
 } hapi_vendor_symbol;
 
 typedef struct hapi_vendor {
-  const char *device; /* for texts: of the spec */
-  const char *install; /* what to do when the library is not there */
+  const char *device;       /* for texts: of the spec */
+  const char *install;      /* what to do when the library is not there */
   const char *const *names; /* in the order in which they are tried; ends with NULL */
   const hapi_vendor_symbol *symbols;
   size_t count;

@@ -20,10 +20,10 @@
 #include "plugins/common/rotation.h"
 #include "plugins/forcedimension/libdhd.h"
 
-#define PRIORITY 82         /* above loop and watchdog, which it must not wait for */
-#define CYCLE_NS 250000LL   /* the shortest; USB gives up to 4 kHz */
-#define FIRST_WAIT_S 1.0    /* for a first position */
-#define FAILURES_MOST 3     /* in a row: the device is lost */
+#define PRIORITY 82       /* above loop and watchdog, which it must not wait for */
+#define CYCLE_NS 250000LL /* the shortest; USB gives up to 4 kHz */
+#define FIRST_WAIT_S 1.0  /* for a first position */
+#define FAILURES_MOST 3   /* in a row: the device is lost */
 #define REFUSED_NS 500000000LL
 #define ZERO_TRIES 5
 #define NAME_MAX 48
@@ -52,9 +52,9 @@ typedef struct dhd_device {
   /* The carrier. */
   hapi_thread thread;
   atomic_bool ending;
-  int failures;           /* of positions, in a row */
-  int refusals;           /* of forces, in a row */
-  int64_t refused_ns;     /* the last of them */
+  int failures;               /* of positions, in a row */
+  int refusals;               /* of forces, in a row */
+  int64_t refused_ns;         /* the last of them */
   _Atomic(const char *) said; /* by the library, of the last failure; "" */
 } dhd_device;
 
@@ -66,8 +66,8 @@ typedef struct dhd_family {
 } dhd_family;
 
 static const dhd_family families[] = {
-    {"omega", 12.0, 0.0}, {"delta", 20.0, 0.0}, {"sigma", 20.0, 0.4}, {"lambda", 20.0, 0.2},
-    {"", 5.0, 0.0}, /* not known: little */
+    {"omega", 12.0, 0.0},  {"delta", 20.0, 0.0}, {"sigma", 20.0, 0.4},
+    {"lambda", 20.0, 0.2}, {"", 5.0, 0.0}, /* not known: little */
 };
 
 /* ---- the carrier ---- */
@@ -107,8 +107,8 @@ static bool pose_read(dhd_device *device)
 
 static bool force_send(dhd_device *device, const hap_wrench *w)
 {
-  int got = device->dhd.set_force(w->force[0], w->force[1], w->force[2], w->torque[0],
-                                  w->torque[1], w->torque[2], 0.0, device->id);
+  int got = device->dhd.set_force(w->force[0], w->force[1], w->force[2], w->torque[0], w->torque[1],
+                                  w->torque[2], 0.0, device->id);
   if (got < 0) {
     note_failure(device);
   }
@@ -178,7 +178,12 @@ static void *carrier_main(void *arg)
 
 /* ---- open and close ---- */
 
-enum argument { ID, LIBRARY, RELAY, ARGUMENT_COUNT = RELAY + HAPI_RELAY_ARGUMENTS };
+enum argument {
+  ID,
+  LIBRARY,
+  RELAY,
+  ARGUMENT_COUNT = RELAY + HAPI_RELAY_ARGUMENTS
+};
 
 static hap_status dhd_refuse(dhd_device *device, int id, hap_detail *detail)
 {
@@ -236,17 +241,14 @@ static void figures_read(dhd_device *device, hapi_relay_settings *out)
   while (strncasecmp(device->name, family->begin, strlen(family->begin)) != 0) {
     ++family;
   }
-  double limit =
-      device->dhd.get_max_force != NULL ? device->dhd.get_max_force(device->id) : -1.0;
-  bool active =
-      device->dhd.has_active_wrist != NULL && device->dhd.has_active_wrist(device->id);
+  double limit = device->dhd.get_max_force != NULL ? device->dhd.get_max_force(device->id) : -1.0;
+  bool active = device->dhd.has_active_wrist != NULL && device->dhd.has_active_wrist(device->id);
   out->max_force = limit > 0.0 && limit < family->max_force ? limit : family->max_force;
   out->max_torque = active ? family->max_torque : 0.0;
   out->turns = device->dhd.has_wrist(device->id);
 }
 
-static hap_status dhd_find(dhd_device *device, const hapi_argument_table *table,
-                           hap_detail *detail)
+static hap_status dhd_find(dhd_device *device, const hapi_argument_table *table, hap_detail *detail)
 {
   const hapi_argument *entries = table->entries;
   char path[PATH_ROOM];
@@ -496,8 +498,9 @@ const hap_device_ops hapi_forcedimension_ops = {
     .abi = HAP_DEVICE_ABI,
     .size = sizeof(hap_device_ops),
     .name = "forcedimension",
-    .help = "omega, delta, sigma or lambda: [id=N]; needs libdhd of the Force Dimension SDK; never "
-            "tried on hardware; docs/devices-people-own.md",
+    .help =
+        "omega, delta, sigma or lambda: [id=N]; needs libdhd of the Force Dimension SDK; never "
+        "tried on hardware; docs/devices-people-own.md",
     .pacing = HAP_PACING_HOST,
     .open = dhd_open,
     .describe = dhd_describe,

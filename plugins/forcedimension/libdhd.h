@@ -10,7 +10,7 @@
 
 #include "plugins/common/vendor.h"
 
-#define HAPI_DHD_OLD 1        /* of a position: the one before, as less than its time guard passed */
+#define HAPI_DHD_OLD 1 /* of a position: the one before, as less than its time guard passed */
 #define HAPI_DHD_STATUS_MAX 64 /* newer versions tell more than the 13 that are known */
 
 /* Indices of what dhdGetStatus gives. */

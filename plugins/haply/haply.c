@@ -19,14 +19,14 @@
 #include "plugins/haply/message.h"
 #include "plugins/haply/websocket.h"
 
-#define PRIORITY 82           /* above loop and watchdog */
+#define PRIORITY 82 /* above loop and watchdog */
 #define PORT 10001
 #define CONNECT_S 2.0
-#define AGAIN_S 0.1           /* to send a zero through another connection */
-#define WAIT_MS 1             /* until it looks after a zero */
-#define CYCLE_NS 200000LL     /* the shortest */
-#define ASK_NS 100000000LL    /* an answer that stays away is asked for once more */
-#define MAX_FORCE 4.0         /* N: the service does not say; the arm gives more for a moment */
+#define AGAIN_S 0.1        /* to send a zero through another connection */
+#define WAIT_MS 1          /* until it looks after a zero */
+#define CYCLE_NS 200000LL  /* the shortest */
+#define ASK_NS 100000000LL /* an answer that stays away is asked for once more */
+#define MAX_FORCE 4.0      /* N: the service does not say; the arm gives more for a moment */
 #define ZERO_WAIT_NS 50000000LL
 #define HOST_ROOM 104
 
@@ -175,8 +175,7 @@ static void *carrier_main(void *arg)
     hapi_clock_sleep_until(now_ns + CYCLE_NS);
   }
   if (state != HAPI_WEBSOCKET_OPEN) {
-    hapi_relay_set_cause(&device->relay,
-                         state == HAPI_WEBSOCKET_GONE ? HAPLY_GONE : HAPLY_BROKEN);
+    hapi_relay_set_cause(&device->relay, state == HAPI_WEBSOCKET_GONE ? HAPLY_GONE : HAPLY_BROKEN);
     zero_send_anew(device);
   } else {
     zero_send(device);
@@ -187,7 +186,14 @@ static void *carrier_main(void *arg)
 
 /* ---- open and close ---- */
 
-enum argument { HOST, PORT_ARGUMENT, ID, GRIP, RELAY, ARGUMENT_COUNT = RELAY + HAPI_RELAY_ARGUMENTS };
+enum argument {
+  HOST,
+  PORT_ARGUMENT,
+  ID,
+  GRIP,
+  RELAY,
+  ARGUMENT_COUNT = RELAY + HAPI_RELAY_ARGUMENTS
+};
 
 static void first_take(void *user, const char *text, size_t length)
 {
@@ -224,12 +230,12 @@ static hap_status service_ask(haply_device *device, hap_detail *detail)
   }
   hapi_websocket_close(ws);
   if (!device->first_good) {
-    return hapi_fail(detail, HAP_ERROR_FORMAT,
-                     "haply: the service at %.100s:%u %s: it may be another version; update "
-                     "Haply's Inverse Service to 3.1 or later",
-                     device->host, device->port,
-                     device->first_count > 0 ? "sends messages without a list 'inverse3'"
-                                         : "sends nothing");
+    return hapi_fail(
+        detail, HAP_ERROR_FORMAT,
+        "haply: the service at %.100s:%u %s: it may be another version; update "
+        "Haply's Inverse Service to 3.1 or later",
+        device->host, device->port,
+        device->first_count > 0 ? "sends messages without a list 'inverse3'" : "sends nothing");
   }
   return HAP_OK;
 }
@@ -269,9 +275,9 @@ static hap_status arm_choose(haply_device *device, hap_detail *detail)
   }
   snprintf(key, sizeof key, "haply:%s", device->wish.arm);
   if (!hapi_claim(device, key)) {
-    return hapi_fail(detail, HAP_ERROR_DEVICE,
-                     "haply: this program uses Inverse3 %s already; for another one say id=",
-                     device->wish.arm);
+    return hapi_fail(
+        detail, HAP_ERROR_DEVICE,
+        "haply: this program uses Inverse3 %s already; for another one say id=", device->wish.arm);
   }
   return HAP_OK;
 }
@@ -415,8 +421,7 @@ static hap_status haply_start(void *self)
   device->due = true;
   device->zero_last = false;
   atomic_store(&device->ending, false);
-  if (hapi_thread_start(&device->thread, carrier_main, device, "hapode-haply", PRIORITY) <
-      HAP_OK) {
+  if (hapi_thread_start(&device->thread, carrier_main, device, "hapode-haply", PRIORITY) < HAP_OK) {
     hapi_relay_stop(&device->relay);
     return start_fail(device, HAPLY_NO_THREAD);
   }
@@ -521,8 +526,9 @@ const hap_device_ops hapi_haply_ops = {
     .abi = HAP_DEVICE_ABI,
     .size = sizeof(hap_device_ops),
     .name = "haply",
-    .help = "Haply Inverse3: [id=ID]; needs Haply's Inverse Service at ws://localhost:10001; never "
-            "tried on hardware; docs/devices-people-own.md",
+    .help =
+        "Haply Inverse3: [id=ID]; needs Haply's Inverse Service at ws://localhost:10001; never "
+        "tried on hardware; docs/devices-people-own.md",
     .pacing = HAP_PACING_HOST,
     .open = haply_open,
     .describe = haply_describe,

@@ -22,7 +22,8 @@ typedef struct haply_entry {
 
 bool hapi_haply_is_id(const char *id)
 {
-  static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_.:";
+  static const char allowed[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_.:";
   size_t length = strlen(id);
   return length > 0 && length + 1 < HAPI_HAPLY_ID && strspn(id, allowed) == length;
 }
@@ -172,9 +173,10 @@ size_t hapi_haply_write_force(const char *id, const double force[3], char out[HA
   for (int i = 0; i < 3; ++i) {
     hapi_number_write(numbers[i], sizeof numbers[i], force[i]);
   }
-  int length = snprintf(out, HAPI_HAPLY_TEXT,
-                        "{\"inverse3\":[{\"device_id\":\"%.39s\",\"commands\":{\"set_cursor_force\":"
-                        "{\"values\":{\"x\":%s,\"y\":%s,\"z\":%s}}}}]}",
-                        id, numbers[0], numbers[1], numbers[2]);
+  int length =
+      snprintf(out, HAPI_HAPLY_TEXT,
+               "{\"inverse3\":[{\"device_id\":\"%.39s\",\"commands\":{\"set_cursor_force\":"
+               "{\"values\":{\"x\":%s,\"y\":%s,\"z\":%s}}}}]}",
+               id, numbers[0], numbers[1], numbers[2]);
   return length > 0 && length < HAPI_HAPLY_TEXT ? (size_t)length : 0;
 }

@@ -38,10 +38,8 @@ void hapi_websocket_wait(hapi_websocket *ws, int ms)
   (void)ws, (void)ms;
 }
 
-hapi_websocket_state hapi_websocket_receive(hapi_websocket *ws,
-                                            void (*take)(void *user, const char *text,
-                                                         size_t length),
-                                            void *user)
+hapi_websocket_state hapi_websocket_receive(
+    hapi_websocket *ws, void (*take)(void *user, const char *text, size_t length), void *user)
 {
   (void)ws, (void)take, (void)user;
   return HAPI_WEBSOCKET_GONE;
@@ -367,10 +365,8 @@ void hapi_websocket_wait(hapi_websocket *ws, int ms)
   }
 }
 
-hapi_websocket_state hapi_websocket_receive(hapi_websocket *ws,
-                                            void (*take)(void *user, const char *text,
-                                                         size_t length),
-                                            void *user)
+hapi_websocket_state hapi_websocket_receive(
+    hapi_websocket *ws, void (*take)(void *user, const char *text, size_t length), void *user)
 {
   ws->take = take;
   ws->user = user;
@@ -396,13 +392,12 @@ bool hapi_websocket_send(hapi_websocket *ws, const char *text, size_t length)
 {
   const struct wslay_event_msg message = {WSLAY_TEXT_FRAME, (const uint8_t *)text, length};
   /* What has not gone out must not be followed: it would be old when it arrives. */
-  if (ws->failed ||
-      (wslay_event_want_write(ws->context) &&
-       (wslay_event_send(ws->context) != 0 || wslay_event_want_write(ws->context)))) {
+  if (ws->failed || (wslay_event_want_write(ws->context) &&
+                     (wslay_event_send(ws->context) != 0 || wslay_event_want_write(ws->context)))) {
     return false;
   }
-  return wslay_event_queue_msg(ws->context, &message) == 0 &&
-         wslay_event_send(ws->context) == 0 && !wslay_event_want_write(ws->context);
+  return wslay_event_queue_msg(ws->context, &message) == 0 && wslay_event_send(ws->context) == 0 &&
+         !wslay_event_want_write(ws->context);
 }
 
 #endif

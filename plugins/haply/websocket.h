@@ -17,8 +17,8 @@ typedef struct hapi_websocket hapi_websocket;
 
 typedef enum hapi_websocket_state {
   HAPI_WEBSOCKET_OPEN = 0,
-  HAPI_WEBSOCKET_GONE,    /* the other side closed it or has gone */
-  HAPI_WEBSOCKET_BROKEN,  /* its bytes are no WebSocket, or a message is too large */
+  HAPI_WEBSOCKET_GONE,   /* the other side closed it or has gone */
+  HAPI_WEBSOCKET_BROKEN, /* its bytes are no WebSocket, or a message is too large */
 } hapi_websocket_state;
 
 typedef struct hapi_websocket_place {
@@ -44,10 +44,8 @@ void hapi_websocket_close(hapi_websocket *ws);
 void hapi_websocket_wait(hapi_websocket *ws, int ms);
 
 /* Takes what has come, without waiting, and calls for each whole text message. */
-hapi_websocket_state hapi_websocket_receive(hapi_websocket *ws,
-                                            void (*take)(void *user, const char *text,
-                                                         size_t length),
-                                            void *user);
+hapi_websocket_state hapi_websocket_receive(
+    hapi_websocket *ws, void (*take)(void *user, const char *text, size_t length), void *user);
 
 /* False: it did not go out, as earlier bytes have not, or the connection is closed. */
 bool hapi_websocket_send(hapi_websocket *ws, const char *text, size_t length);

@@ -7,12 +7,23 @@
 
 /* In the order of hapi_hd. */
 static const hapi_vendor_symbol symbols[] = {
-    {"hdInitDevice", true},        {"hdDisableDevice", true}, {"hdMakeCurrentDevice", true},
-    {"hdBeginFrame", true},        {"hdEndFrame", true},      {"hdGetDoublev", true},
-    {"hdGetIntegerv", true},       {"hdGetString", true},     {"hdSetDoublev", true},
-    {"hdEnable", true},            {"hdDisable", true},       {"hdGetError", true},
-    {"hdScheduleAsynchronous", true}, {"hdUnschedule", true}, {"hdStartScheduler", true},
-    {"hdStopScheduler", true},     {"hdCheckCalibration", false},
+    {"hdInitDevice", true},
+    {"hdDisableDevice", true},
+    {"hdMakeCurrentDevice", true},
+    {"hdBeginFrame", true},
+    {"hdEndFrame", true},
+    {"hdGetDoublev", true},
+    {"hdGetIntegerv", true},
+    {"hdGetString", true},
+    {"hdSetDoublev", true},
+    {"hdEnable", true},
+    {"hdDisable", true},
+    {"hdGetError", true},
+    {"hdScheduleAsynchronous", true},
+    {"hdUnschedule", true},
+    {"hdStartScheduler", true},
+    {"hdStopScheduler", true},
+    {"hdCheckCalibration", false},
 };
 
 #define SYMBOLS (sizeof symbols / sizeof symbols[0])
@@ -23,8 +34,9 @@ hap_status hapi_hd_load(const char *path, void **out_library, hapi_hd *out, hap_
 {
   static const hapi_vendor vendor = {
       .device = "openhaptics",
-      .install = "install OpenHaptics 3 and the Touch device driver (3dsystems.com), then run "
-                 "Touch_Setup",
+      .install =
+          "install OpenHaptics 3 and the Touch device driver (3dsystems.com), then run "
+          "Touch_Setup",
       .names = names,
       .symbols = symbols,
       .count = SYMBOLS,

@@ -24,10 +24,10 @@ typedef enum hapi_hd_get {
   HAPI_HD_WORKSPACE = 0x2551, /* 6 numbers: the low corner, the high one */
   HAPI_HD_INPUT_DOF = 0x2553,
   HAPI_HD_OUTPUT_DOF = 0x2554,
-  HAPI_HD_MAX_STIFFNESS = 0x2602,       /* N/mm */
-  HAPI_HD_MAX_FORCE = 0x2603,           /* N, for a moment */
+  HAPI_HD_MAX_STIFFNESS = 0x2602,        /* N/mm */
+  HAPI_HD_MAX_FORCE = 0x2603,            /* N, for a moment */
   HAPI_HD_MAX_CONTINUOUS_FORCE = 0x2604, /* N */
-  HAPI_HD_TEMPERATURE = 0x2605,         /* of up to 6 motors: 0 cold, 1 too warm */
+  HAPI_HD_TEMPERATURE = 0x2605,          /* of up to 6 motors: 0 cold, 1 too warm */
   HAPI_HD_FORCE = 0x2700,
   HAPI_HD_TORQUE = 0x2701
 } hapi_hd_get;

@@ -20,7 +20,7 @@
 
 #define MM 1e-3
 #define FIRST_WAIT_S 1.0
-#define REST_WAIT_S 0.1           /* for the last zero, and for the last callback */
+#define REST_WAIT_S 0.1 /* for the last zero, and for the last callback */
 #define LOOK_NS 500000LL
 #define COMPLAINT_NS 1000000000LL /* a complaint of the library counts for so long */
 #define ERRORS_MOST 8             /* that are taken off the library's list in a tick */
@@ -62,7 +62,8 @@ typedef struct hd_device {
   /* The scheduler's thread. */
   atomic_bool ending;
   atomic_bool ended;
-  atomic_bool inside; /* of a callback: the library's scheduler waits for its end, and so would we */
+  atomic_bool
+      inside; /* of a callback: the library's scheduler waits for its end, and so would we */
   int failures;
   int complaint; /* hd_cause; 0: none */
   int64_t complaint_ns;
@@ -189,7 +190,12 @@ static unsigned int scheduler_tick(void *user)
 
 /* ---- open and close ---- */
 
-enum argument { NAME, LIBRARY, RELAY, ARGUMENT_COUNT = RELAY + HAPI_RELAY_ARGUMENTS };
+enum argument {
+  NAME,
+  LIBRARY,
+  RELAY,
+  ARGUMENT_COUNT = RELAY + HAPI_RELAY_ARGUMENTS
+};
 
 static unsigned int errors_drop(const hd_device *device)
 {
@@ -566,8 +572,9 @@ const hap_device_ops hapi_openhaptics_ops = {
     .abi = HAP_DEVICE_ABI,
     .size = sizeof(hap_device_ops),
     .name = "openhaptics",
-    .help = "3D Systems Touch, Phantom: [name=NAME]; needs libHD of OpenHaptics 3; never tried on "
-            "hardware; docs/devices-people-own.md",
+    .help =
+        "3D Systems Touch, Phantom: [name=NAME]; needs libHD of OpenHaptics 3; never tried on "
+        "hardware; docs/devices-people-own.md",
     .pacing = HAP_PACING_HOST,
     .open = hd_open,
     .describe = hd_describe,

@@ -34,8 +34,8 @@ static bool inside_walk(hapi_json *json, char bracket)
 {
   char key[8];
   bool good = hapi_json_enter(json, bracket);
-  while (good && (bracket == '{' ? hapi_json_member(json, key, sizeof key)
-                                 : hapi_json_element(json))) {
+  while (good &&
+         (bracket == '{' ? hapi_json_member(json, key, sizeof key) : hapi_json_element(json))) {
     FUZZ_CHECK(bracket != '{' || strlen(key) < sizeof key);
     good = value_walk(json);
   }

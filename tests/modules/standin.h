@@ -14,32 +14,32 @@
 
 typedef enum standin_fault {
   STANDIN_WELL = 0,
-  STANDIN_READ_FAILS,   /* positions; libHD: an error of communication at the end of a frame */
-  STANDIN_FORCE_FAILS,  /* dhd: the call fails; libHD: more than the largest force */
-  STANDIN_WARM,         /* libHD: the motors */
-  STANDIN_NAN,          /* positions */
-  STANDIN_BAD_FRAME,    /* no rotation */
-  STANDIN_SILENT,       /* dhd: always an old position; libHD: the scheduler calls nobody */
-  STANDIN_HANGS,        /* a call does not come back until it is over */
-  STANDIN_UNPLUGGED,    /* all calls fail, also opening */
-  STANDIN_NOT_THERE,    /* no device */
-  STANDIN_NO_POWER,     /* dhd */
-  STANDIN_NOT_READY,    /* not calibrated */
-  STANDIN_NOT_ENABLED,  /* dhd: forces cannot be enabled */
-  STANDIN_IN_USE        /* libHD: by another program */
+  STANDIN_READ_FAILS,  /* positions; libHD: an error of communication at the end of a frame */
+  STANDIN_FORCE_FAILS, /* dhd: the call fails; libHD: more than the largest force */
+  STANDIN_WARM,        /* libHD: the motors */
+  STANDIN_NAN,         /* positions */
+  STANDIN_BAD_FRAME,   /* no rotation */
+  STANDIN_SILENT,      /* dhd: always an old position; libHD: the scheduler calls nobody */
+  STANDIN_HANGS,       /* a call does not come back until it is over */
+  STANDIN_UNPLUGGED,   /* all calls fail, also opening */
+  STANDIN_NOT_THERE,   /* no device */
+  STANDIN_NO_POWER,    /* dhd */
+  STANDIN_NOT_READY,   /* not calibrated */
+  STANDIN_NOT_ENABLED, /* dhd: forces cannot be enabled */
+  STANDIN_IN_USE       /* libHD: by another program */
 } standin_fault;
 
 typedef struct standin_device {
-  _Atomic int fault; /* standin_fault */
+  _Atomic int fault;          /* standin_fault */
   _Atomic double position[3]; /* m: the middle */
   _Atomic double swing[3];    /* m, to and fro */
   _Atomic double turn[3];     /* rad, a rotation vector */
   _Atomic int buttons;
   _Atomic int late_ms; /* each call of a position waits so long */
 
-  _Atomic int opened;  /* now */
-  _Atomic int opens;   /* so far */
-  _Atomic int enabled; /* forces */
+  _Atomic int opened;      /* now */
+  _Atomic int opens;       /* so far */
+  _Atomic int enabled;     /* forces */
   _Atomic double force[3]; /* N, what acts */
   _Atomic double torque[3];
   _Atomic uint64_t forces; /* that were set */
@@ -47,10 +47,10 @@ typedef struct standin_device {
 } standin_device;
 
 typedef struct standin {
-  _Atomic int count; /* devices on USB */
-  _Atomic int wrist; /* 0: none, 1: passive, 2: active */
-  _Atomic int misuse; /* calls that the maker forbids: two at once, outside of a frame... */
-  _Atomic double hz;  /* of the swing */
+  _Atomic int count;     /* devices on USB */
+  _Atomic int wrist;     /* 0: none, 1: passive, 2: active */
+  _Atomic int misuse;    /* calls that the maker forbids: two at once, outside of a frame... */
+  _Atomic double hz;     /* of the swing */
   _Atomic int scheduler; /* libHD: it runs */
   standin_device of[STANDIN_DEVICES];
 } standin;

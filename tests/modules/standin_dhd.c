@@ -57,8 +57,9 @@ static int device_enter(char id)
 int dhdGetDeviceCount(void)
 {
   int fault = atomic_load(&standin_get()->of[0].fault);
-  return fault == STANDIN_NOT_THERE || fault == STANDIN_UNPLUGGED ? 0
-                                                                  : atomic_load(&standin_get()->count);
+  return fault == STANDIN_NOT_THERE || fault == STANDIN_UNPLUGGED
+             ? 0
+             : atomic_load(&standin_get()->count);
 }
 
 int dhdOpenID(char id)
