@@ -229,7 +229,7 @@ TEST(a_service_that_goes_and_comes_back)
 /* ---- a service that stalls for 200 ms ---- */
 
 /* The guard's table: all of the force for 4 ms, none after 18 ms, latched; over 20 ms back after a
- * reset. When it goes on, it finds the force of before and behind it a zero, and nothing between. */
+ * reset. A service that goes on finds one force of before, and behind it a zero. */
 TEST(a_stall_of_200_ms_fades_and_latches)
 {
   char at[64];

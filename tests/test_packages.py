@@ -53,7 +53,10 @@ completes() {
   done
   bash -c '. /usr/share/bash-completion/completions/hapode-run && complete -p hapode-run'
 }
-rules() { test -s /usr/lib/udev/rules.d/60-hapode-spidar.rules; }
+rules() {
+  test -s /usr/lib/udev/rules.d/60-hapode-spidar.rules &&
+    test -s /usr/lib/udev/rules.d/60-hapode-forcedimension.rules
+}
 removes() {
   apt_get purge libhapode1 libhapode-common libhapode-dev hapode-tools python3-hapode
 }

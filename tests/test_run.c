@@ -62,7 +62,9 @@ TEST(help_list_and_version_are_answered)
                                "replay",       "impulse",
                                "accelerance",  "contact",
                                "testing",      "k 2000 N/m",
-                               "duration 2 s", "accelerance (never off), contact"};
+                               "duration 2 s", "accelerance (never off), contact",
+                               "install it from haply.co", "install the maker's SDK 3",
+                               "run Touch_Setup"};
   for (size_t i = 0; i < sizeof there / sizeof there[0]; ++i) {
     if (strstr(ran.out, there[i]) == NULL) {
       printf("# --list does not tell of %s\n", there[i]);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "device/device.h"
+#include "plugins/haply/websocket.h"
 #include "plugins/spidar/serial.h"
 #include "scenes/scenes.h"
 #include "tools/run_effects.h"
@@ -75,6 +76,30 @@ static void print_ports(FILE *out)
                     : "there is no serial port of a USB adapter");
 }
 
+/* What a device needs, and what is done about it; nothing of it is loaded or asked. */
+static void print_needs(const char *name, FILE *out)
+{
+  static const struct {
+    const char *name;
+    const char *needs;
+  } known[] = {
+      {"haply", "needs the maker's Inverse Service: install it from haply.co, start it"},
+      {"forcedimension", "needs libdhd.so.3: install the maker's SDK 3, run ldconfig"},
+      {"openhaptics",
+       "needs libHD.so.3: install OpenHaptics and the Touch driver, run Touch_Setup"},
+  };
+  for (size_t i = 0; i < sizeof known / sizeof known[0]; ++i) {
+    if (strcmp(known[i].name, name) == 0) {
+      fprintf(out, "%15s%s\n", "", known[i].needs);
+      fprintf(out, "%15snot asked; --list-probe opens it\n", "");
+    }
+  }
+  if (strcmp(name, "haply") == 0 && !hapi_websocket_is_there()) {
+    fprintf(out, "%15sand libwslay, without which hapode was built: install libwslay-dev, build\n",
+            "");
+  }
+}
+
 /* Of hardware, asked: whether it is there, and else why it cannot be used. */
 static void print_device(const char *name, const char *text, FILE *out, bool probe)
 {
@@ -87,7 +112,10 @@ static void print_device(const char *name, const char *text, FILE *out, bool pro
     return;
   }
   if (!probe) {
-    print_ports(out);
+    if (strcmp(name, "spidar") == 0) {
+      print_ports(out);
+    }
+    print_needs(name, out);
     return;
   }
   if (hap_device_open(name, &device, &detail) < HAP_OK) {

@@ -4,7 +4,8 @@
 #define HAPODE_PLUGINS_COMMON_RELAY_H
 
 /* Between the tick and a carrier: the thread that talks to hardware through calls that may block, a
- * maker's library or a socket. Both sides exchange their newest values and never wait.
+ * maker's library or a socket. Both sides exchange their newest values and never wait. This is the
+ * tick's side; relay_carrier.h has the other one.
  *
  * A device that says nothing is no hand at rest: samples have the time of their arrival, and the
  * tick is told when the newest one is too old. A force that nobody renews is no force: the carrier
@@ -16,7 +17,6 @@
 
 #include <hapode/device_impl.h>
 
-#include "plugins/common/arguments.h"
 #include "sync/triple_buffer.h"
 
 /* ---- what is exchanged ---- */
@@ -81,24 +81,6 @@ typedef struct hapi_relay {
   hapi_relay_carrier carrier;
 } hapi_relay;
 
-/* ---- [control] ---- */
-
-/* The arguments that all of these devices have: max_force, max_torque, stale, timeout, turn. */
-#define HAPI_RELAY_ARGUMENTS 5
-void hapi_relay_arguments(hapi_argument out[HAPI_RELAY_ARGUMENTS]);
-/* What was given, over what out has. HAP_ERROR_ARGUMENT: stale is not below timeout. */
-HAP_NODISCARD hap_status hapi_relay_take_arguments(const hapi_argument_table *table,
-                                                   const hapi_argument *given,
-                                                   hapi_relay_settings *out, hap_detail *detail);
-
-void hapi_relay_init(hapi_relay *relay, const hapi_relay_settings *settings);
-
-/* Before the carrier begins: no force, no sample, no cause. When the process ends by itself, the
- * force is zero first; false: too many devices run. */
-HAP_NODISCARD bool hapi_relay_start(hapi_relay *relay);
-/* After the carrier has ended. */
-void hapi_relay_stop(hapi_relay *relay);
-
 /* ---- [haptic] the operations of hap_device_ops: no lock, no call of the system ---- */
 
 HAP_NODISCARD hap_status hapi_relay_read(hapi_relay *relay, int64_t time_ns, hap_device_input *out);
@@ -109,20 +91,12 @@ void hapi_relay_held(const hapi_relay *relay, hap_wrench *out);
 /* [any] Also a signal handler. */
 void hapi_relay_zero(hapi_relay *relay);
 
-/* ---- [carrier] ---- */
+/* ---- [any] ---- */
 
-/* False: it is not finite or no rotation, and is not used. */
-bool hapi_relay_publish(hapi_relay *relay, const hapi_relay_sample *sample);
-/* What shall act now; zero, when nothing shall. */
-void hapi_relay_wanted(hapi_relay *relay, int64_t now_ns, hap_wrench *out);
-/* After it went out. True: in the meantime zero was called, and has to go out at once. */
-bool hapi_relay_sent(hapi_relay *relay, const hap_wrench *sent);
-/* WELL ends it. From any thread, as is the next. */
+/* WELL ends it. */
 void hapi_relay_set_cause(hapi_relay *relay, int cause);
 /* A message without a sample; read says so when it runs out of samples. */
 void hapi_relay_set_doubt(hapi_relay *relay, int cause);
-
-/* ---- [any] ---- */
 
 int hapi_relay_cause_now(const hapi_relay *relay);
 int hapi_relay_cause_last(const hapi_relay *relay);

@@ -16,7 +16,7 @@
 #include "base/safety.h"
 #include "base/thread.h"
 #include "plugins/common/claims.h"
-#include "plugins/common/relay.h"
+#include "plugins/common/relay_carrier.h"
 #include "plugins/common/rotation.h"
 #include "plugins/forcedimension/libdhd.h"
 
@@ -499,8 +499,9 @@ const hap_device_ops hapi_forcedimension_ops = {
     .size = sizeof(hap_device_ops),
     .name = "forcedimension",
     .help =
-        "omega, delta, sigma or lambda: [id=N]; needs libdhd of the Force Dimension SDK; never "
-        "tried on hardware; docs/devices-people-own.md",
+        "omega, delta, sigma or lambda, by libdhd: [id=N][,library=PATH][,max_force=N]"
+        "[,max_torque=NM][,turn=0|1][,stale=S][,timeout=S]; never tried on hardware; "
+        "docs/vendor-devices.md",
     .pacing = HAP_PACING_HOST,
     .open = dhd_open,
     .describe = dhd_describe,

@@ -15,7 +15,7 @@
 #include "base/safety.h"
 #include "base/thread.h"
 #include "plugins/common/claims.h"
-#include "plugins/common/relay.h"
+#include "plugins/common/relay_carrier.h"
 #include "plugins/haply/message.h"
 #include "plugins/haply/websocket.h"
 
@@ -527,8 +527,8 @@ const hap_device_ops hapi_haply_ops = {
     .size = sizeof(hap_device_ops),
     .name = "haply",
     .help =
-        "Haply Inverse3: [id=ID]; needs Haply's Inverse Service at ws://localhost:10001; never "
-        "tried on hardware; docs/devices-people-own.md",
+        "Haply Inverse3, by its service: [id=ID][,grip=ID][,host=NAME][,port=N][,max_force=N]"
+        "[,turn=0|1][,stale=S][,timeout=S]; never tried on hardware; docs/vendor-devices.md",
     .pacing = HAP_PACING_HOST,
     .open = haply_open,
     .describe = haply_describe,

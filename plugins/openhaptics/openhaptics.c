@@ -2,9 +2,9 @@
  * SPDX-License-Identifier: MIT */
 
 /* The device openhaptics: 3D Systems Touch and Touch X, Geomagic, Phantom, by the maker's library.
- * Its scheduler is a thread of its own with 1 kHz, which calls scheduler_tick; the tick of a session
- * exchanges newest values with it. Frame of the library: x to the right, y up, z towards the user.
- * Its millimetres become metres here. */
+ * Its scheduler is a thread of its own with 1 kHz, which calls scheduler_tick. The tick of a
+ * session exchanges newest values with it. Frame of the library: x to the right, y up, z towards
+ * the user. Its millimetres become metres here. */
 
 #include <stdio.h>
 #include <string.h>
@@ -14,7 +14,7 @@
 #include "base/log.h"
 #include "base/vec.h"
 #include "plugins/common/claims.h"
-#include "plugins/common/relay.h"
+#include "plugins/common/relay_carrier.h"
 #include "plugins/common/rotation.h"
 #include "plugins/openhaptics/libhd.h"
 
@@ -573,8 +573,9 @@ const hap_device_ops hapi_openhaptics_ops = {
     .size = sizeof(hap_device_ops),
     .name = "openhaptics",
     .help =
-        "3D Systems Touch, Phantom: [name=NAME]; needs libHD of OpenHaptics 3; never tried on "
-        "hardware; docs/devices-people-own.md",
+        "3D Systems Touch, Phantom, by libHD: [name=NAME][,library=PATH][,max_force=N]"
+        "[,max_torque=NM][,turn=0|1][,stale=S][,timeout=S]; never tried on hardware; "
+        "docs/vendor-devices.md",
     .pacing = HAP_PACING_HOST,
     .open = hd_open,
     .describe = hd_describe,

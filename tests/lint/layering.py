@@ -46,6 +46,7 @@ LAYERS = {
     "lib/session": ["lib/*"],
     "lib/scene": ["lib/*", "scenes"],
     "plugins/skeleton": [],
+    "plugins/common": ["lib/base", "lib/sync"],
     "plugins/*": ["lib/base", "plugins/common"],
     "scenes": [],
     "view": [],

@@ -132,7 +132,7 @@ void hdBeginFrame(HHD device)
   memset(frame_torque, 0, sizeof frame_torque);
 }
 
-static double norm3(const double v[3])
+static double vector_norm(const double v[3])
 {
   return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
@@ -155,7 +155,7 @@ void hdEndFrame(HHD device)
   if (fault == STANDIN_WARM) {
     error_push(0x200);
   }
-  if (fault == STANDIN_FORCE_FAILS && norm3(frame_force) > 0.0) {
+  if (fault == STANDIN_FORCE_FAILS && vector_norm(frame_force) > 0.0) {
     error_push(0x201);
     return;
   }
