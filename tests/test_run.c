@@ -56,14 +56,22 @@ TEST(help_list_and_version_are_answered)
   CHECK(run("--version") == 0);
   CHECK(strncmp(ran.out, "hapode-run 0.", 13) == 0);
   CHECK(run("--list") == 0);
-  const char *const there[] = {"fig5",         "row10[:N]",
-                               "pile[:N]",     "lightstand",
-                               "mass 60 kg",   "virtual",
-                               "replay",       "impulse",
-                               "accelerance",  "contact",
-                               "testing",      "k 2000 N/m",
-                               "duration 2 s", "accelerance (never off), contact",
-                               "install it from haply.co", "install the maker's SDK 3",
+  const char *const there[] = {"fig5",
+                               "row10[:N]",
+                               "pile[:N]",
+                               "lightstand",
+                               "mass 60 kg",
+                               "virtual",
+                               "replay",
+                               "impulse",
+                               "accelerance",
+                               "contact",
+                               "testing",
+                               "k 2000 N/m",
+                               "duration 2 s",
+                               "accelerance (never off), contact",
+                               "install it from haply.co",
+                               "install the maker's SDK 3",
                                "run Touch_Setup"};
   for (size_t i = 0; i < sizeof there / sizeof there[0]; ++i) {
     if (strstr(ran.out, there[i]) == NULL) {
