@@ -7,6 +7,7 @@
 
 #define MAGIC "258EAFA5-E914-47DA-95CA-C5AB0DC85B11" /* RFC 6455, 1.3 */
 #define BLOCK 64
+#define PADDING 64 /* base64: place of its sign */
 
 /* ---- SHA-1, RFC 3174: the protocol asks for it, as a check and not for secrecy ---- */
 
@@ -71,15 +72,15 @@ static void sha1_short(const uint8_t *text, size_t length, uint8_t out[20])
 
 static void base64_write(const uint8_t *bytes, size_t count, char *out)
 {
-  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=";
   for (size_t i = 0; i < count; i += 3) {
     size_t left = count - i;
     uint32_t group = (uint32_t)bytes[i] << 16 | (left > 1 ? (uint32_t)bytes[i + 1] << 8 : 0) |
                      (left > 2 ? bytes[i + 2] : 0u);
     *out++ = digits[group >> 18];
     *out++ = digits[group >> 12 & 63];
-    *out++ = left > 1 ? digits[group >> 6 & 63] : '=';
-    *out++ = left > 2 ? digits[group & 63] : '=';
+    *out++ = digits[left > 1 ? group >> 6 & 63 : PADDING];
+    *out++ = digits[left > 2 ? group & 63 : PADDING];
   }
   *out = '\0';
 }

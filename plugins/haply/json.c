@@ -22,7 +22,10 @@ static char json_look(hapi_json *json)
          (*json->at == ' ' || *json->at == '\t' || *json->at == '\n' || *json->at == '\r')) {
     ++json->at;
   }
-  return !json->bad && json->at < json->end ? *json->at : '\0';
+  if (json->bad || json->at >= json->end) {
+    return '\0';
+  }
+  return *json->at;
 }
 
 static bool json_take(hapi_json *json, char c)
@@ -148,9 +151,11 @@ static bool string_escape(hapi_json *json, json_text *text)
 {
   static const char names[] = "\"\\/bfnrt";
   static const char meant[] = "\"\\/\b\f\n\r\t";
-  char c = json->at < json->end ? *json->at : '\0';
-  const char *name = c != '\0' ? strchr(names, c) : NULL;
-  if (c == 'u') {
+  if (json->at >= json->end || *json->at == '\0') {
+    return json_fail(json);
+  }
+  const char *name = strchr(names, *json->at);
+  if (*json->at == 'u') {
     ++json->at;
     return string_hex(json, text);
   }
