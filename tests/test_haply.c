@@ -262,9 +262,9 @@ TEST(split_frames_and_pings_are_no_fault)
   hap_device_input in;
   service *s = service_new(NULL);
   device_rig *r = rig_new(service_spec(s, SLOW));
-  service_tell(s, "fault split");
-  service_tell(s, "at 0.01 0.02 0.03");
   service_tell(s, "ping");
+  service_tell(s, "at 0.01 0.02 0.03");
+  service_tell(s, "fault split"); /* with more pings */
   in = read_settled(r);
   in = read_settled(r);
   CHECK_NEAR(in.pose.position[2], 0.03, 1e-12);

@@ -329,7 +329,7 @@ TEST(a_force_that_nobody_renews_is_taken_off)
   }
 }
 
-TEST(a_force_ends_100_ms_after_the_last_write)
+TEST(times_are_those_of_the_safety_page)
 {
   CHECK(HAPI_SAFETY_UNWRITTEN_S == 0.1 && HAPI_SAFETY_SILENT_S == 0.01 &&
         HAPI_SAFETY_LOST_S == 0.06);

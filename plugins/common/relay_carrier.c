@@ -228,12 +228,16 @@ void hapi_relay_wanted(hapi_relay *relay, int64_t now_ns, hap_wrench *out)
   double unwritten = 1e-9 * (double)(now_ns - carrier->fresh_ns);
   bool none = atomic_load(&relay->zeroed) || unwritten > HAPI_SAFETY_UNWRITTEN_S ||
               atomic_load(&relay->cause) != HAPI_RELAY_WELL || hapi_relay_is_leaving();
+  bool rested = atomic_load(&relay->resting);
   memset(out, 0, sizeof *out);
   if (!none) {
     *out = relay->commands[hapi_triple_front(&relay->command_places)];
+    atomic_store(&relay->resting, rested && hapi_relay_is_zero(out));
   }
-  if (!hapi_relay_is_zero(out)) {
-    atomic_store(&relay->resting, false);
+  /* Once more: who raised a flag in between, and saw it resting, does not wait for a zero. */
+  if (!none && (atomic_load(&relay->zeroed) || hapi_relay_is_leaving())) {
+    memset(out, 0, sizeof *out);
+    atomic_store(&relay->resting, rested);
   }
 }
 

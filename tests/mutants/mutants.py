@@ -52,7 +52,11 @@ AREAS = [
     ("lib/pointer/device_pace.c", ["device_pace", "false_input"]),
     ("lib/pointer/plausible.c", ["safety_numbers", "false_input", "faults", "late"]),
     ("lib/base/safety.h", GUARD_TESTS + GRIP_TESTS + FEEL_TESTS + WATCH_TESTS +
-     SPIDAR_TESTS + CONTACT_TESTS + ["spidar_guard", "device_pace"]),
+     SPIDAR_TESTS + CONTACT_TESTS + ["spidar_guard", "device_pace", "vendor"]),
+    ("plugins/common/relay*.c", ["vendor", "haply"]),
+    ("plugins/forcedimension/forcedimension.c", ["vendor"]),
+    ("plugins/openhaptics/openhaptics.c", ["vendor"]),
+    ("plugins/haply/haply.c", ["haply"]),
     ("plugins/spidar/guard.c", ["spidar_guard", "spidar"]),
     ("plugins/spidar/belief.c", ["spidar_device", "safety_numbers", "false_input",
                                  "spidar_emulator"]),
