@@ -40,8 +40,8 @@ static bool json_take(hapi_json *json, char c)
 void hapi_json_begin(hapi_json *json, const char *text, size_t length)
 {
   memset(json, 0, sizeof *json);
-  json->at = text;
-  json->end = text + length;
+  json->at = text != NULL ? text : ""; /* of a message without bytes */
+  json->end = json->at + length;
 }
 
 /* ---- objects and arrays ---- */

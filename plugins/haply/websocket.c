@@ -6,6 +6,8 @@
 
 #ifndef HAPODE_WSLAY
 
+#include <unistd.h>
+
 bool hapi_websocket_is_there(void)
 {
   return false;
@@ -24,7 +26,7 @@ hap_status hapi_websocket_open(const hapi_websocket_place *place, double seconds
 
 hapi_websocket *hapi_websocket_adopt(int fd)
 {
-  (void)fd;
+  (void)close(fd);
   return NULL;
 }
 
