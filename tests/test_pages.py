@@ -18,9 +18,9 @@ PATH = re.compile(r"`((?:docs|lib(?!/udev)|include|tests|tools|bench|scenes|plug
                   r"[\w./*-]+)`")
 # Words of a command that calls for hardware, for a driver, for a file of another one, or for a
 # clock.
-NEEDS_MORE = ("spidar", "module:", "replay:", "/", "--play", "--identity", "--record",
-              "--tick-share", "--physics-share", "--reconnect", "--shot", "--frames",
-              "--view", "--html")
+NEEDS_MORE = ("spidar", "haply", "forcedimension", "openhaptics", "module:", "replay:", "/",
+              "--play", "--identity", "--record", "--tick-share", "--physics-share",
+              "--reconnect", "--shot", "--frames", "--view", "--html")
 FILE_ENDS = (".xml", ".urdf")
 # What a piece of code may use; a whole program has a main of its own.
 BEFORE = """#include <hapode/hapode.h>
