@@ -25,6 +25,7 @@
 #define FIRST_WAIT_S 1.0  /* for a first position */
 #define FAILURES_MOST 3   /* in a row: the device is lost */
 #define REFUSED_NS 500000000LL
+#define RATE_NS 500000000LL
 #define ZERO_TRIES 5
 #define NAME_MAX 48
 #define PATH_ROOM 256
@@ -55,6 +56,8 @@ typedef struct dhd_device {
   int failures;               /* of positions, in a row */
   int refusals;               /* of forces, in a row */
   int64_t refused_ns;         /* the last of them */
+  int64_t rated_ns;           /* when the rate was asked for */
+  _Atomic int rate_hz;        /* of the library's exchange with the hardware; 0: not known */
   _Atomic(const char *) said; /* by the library, of the last failure; "" */
 } dhd_device;
 
@@ -142,6 +145,16 @@ static void force_exchange(dhd_device *device, int64_t now_ns)
   }
 }
 
+/* Now and then: for the text of a fault. */
+static void rate_read(dhd_device *device, int64_t now_ns)
+{
+  if (device->dhd.get_rate != NULL && now_ns - device->rated_ns > RATE_NS) {
+    double khz = device->dhd.get_rate(device->id);
+    atomic_store(&device->rate_hz, khz > 0.0 && khz < 1e3 ? (int)(1e3 * khz) : 0);
+    device->rated_ns = now_ns;
+  }
+}
+
 /* False: the device is lost, and waits for a restart. */
 static bool cycle_run(dhd_device *device, int64_t now_ns)
 {
@@ -151,6 +164,7 @@ static bool cycle_run(dhd_device *device, int64_t now_ns)
     return false;
   }
   force_exchange(device, now_ns);
+  rate_read(device, now_ns);
   if (device->refusals >= FAILURES_MOST) {
     hapi_relay_set_cause(&device->relay, DHD_REFUSED);
   } else if (hapi_relay_cause_now(&device->relay) == DHD_REFUSED &&
@@ -484,8 +498,13 @@ static void dhd_explain(void *self, hap_detail *out)
   int cause = hapi_relay_cause_last(&device->relay);
   const char *text = cause_text(cause);
   const char *said = atomic_load(&device->said);
+  int rate_hz = atomic_load(&device->rate_hz);
+  char rate[48] = "";
+  if (rate_hz > 0) {
+    snprintf(rate, sizeof rate, "; its exchange had %d Hz", rate_hz);
+  }
   if (text != NULL) {
-    snprintf(out->text, sizeof out->text, "%s: %s%s%.150s%s", device->name, text,
+    snprintf(out->text, sizeof out->text, "%s: %s%s%s%.150s%s", device->name, text, rate,
              *said != '\0' ? " (libdhd: " : "", said, *said != '\0' ? ")" : "");
   }
 }

@@ -24,7 +24,7 @@
 #define CONNECT_S 2.0
 #define AGAIN_S 0.1        /* to send a zero through another connection */
 #define WAIT_MS 1          /* until it looks after a zero */
-#define CYCLE_NS 200000LL  /* the shortest */
+#define PAUSE_NS 100000LL  /* of each cycle: a flood must not keep the processor */
 #define ASK_NS 100000000LL /* an answer that stays away is asked for once more */
 #define MAX_FORCE 4.0      /* N: the service does not say; the arm gives more for a moment */
 #define ZERO_WAIT_NS 50000000LL
@@ -138,7 +138,7 @@ static void zero_send(haply_device *device)
     if (sent) {
       (void)hapi_relay_sent(&device->relay, &none);
     } else {
-      hapi_clock_sleep_until(hapi_clock_now() + CYCLE_NS);
+      hapi_clock_sleep_until(hapi_clock_now() + PAUSE_NS);
     }
   }
 }
@@ -147,11 +147,12 @@ static void zero_send(haply_device *device)
 static void zero_send_anew(haply_device *device)
 {
   const hapi_websocket_place place = place_of(device);
+  hapi_websocket *before = device->ws;
   hap_detail why;
-  hapi_websocket_close(device->ws);
   if (hapi_websocket_open(&place, AGAIN_S, &device->ws, &why) >= HAP_OK) {
     zero_send(device);
   }
+  hapi_websocket_close(before); /* last: it may wait */
 }
 
 static hapi_websocket_state cycle_run(haply_device *device)
@@ -170,9 +171,8 @@ static void *carrier_main(void *arg)
   hapi_websocket_state state = HAPI_WEBSOCKET_OPEN;
   hapi_thread_prepare_for_ticks();
   while (state == HAPI_WEBSOCKET_OPEN && !atomic_load(&device->ending)) {
-    int64_t now_ns = hapi_clock_now();
     state = cycle_run(device);
-    hapi_clock_sleep_until(now_ns + CYCLE_NS);
+    hapi_clock_sleep_until(hapi_clock_now() + PAUSE_NS);
   }
   if (state != HAPI_WEBSOCKET_OPEN) {
     hapi_relay_set_cause(&device->relay, state == HAPI_WEBSOCKET_GONE ? HAPLY_GONE : HAPLY_BROKEN);
@@ -399,7 +399,7 @@ static bool first_awaited(const haply_device *device)
     if (hapi_clock_now() >= end || hapi_relay_cause_now(&device->relay) != HAPI_RELAY_WELL) {
       return false;
     }
-    hapi_clock_sleep_until(hapi_clock_now() + CYCLE_NS);
+    hapi_clock_sleep_until(hapi_clock_now() + PAUSE_NS);
   }
   return true;
 }

@@ -74,7 +74,7 @@ bool hapi_websocket_send(hapi_websocket *ws, const char *text, size_t length)
 #include "plugins/haply/handshake.h"
 
 #define ANSWER_MOST 4096
-#define RECEIVE_MOST 262144 /* bytes in one call, so that a flood does not keep it */
+#define RECEIVE_MOST 32768 /* bytes in one call, so that a flood does not keep it */
 #define CLOSE_WAIT_NS 100000000LL
 
 struct hapi_websocket {

@@ -28,6 +28,7 @@ STANDIN_CALL bool dhdHasWrist(char id);
 STANDIN_CALL bool dhdHasActiveWrist(char id);
 STANDIN_CALL const char *dhdGetSystemName(char id);
 STANDIN_CALL double dhdGetMaxForce(char id);
+STANDIN_CALL double dhdGetComFreq(char id);
 STANDIN_CALL int dhdGetStatus(int status[16], char id);
 STANDIN_CALL const char *dhdErrorGetLastStr(void);
 
@@ -186,6 +187,11 @@ double dhdGetMaxForce(char id)
 {
   (void)id;
   return -1.0;
+}
+
+double dhdGetComFreq(char id)
+{
+  return device_enter(id) >= 0 ? 3.9 : 0.0; /* kHz */
 }
 
 int dhdGetStatus(int status[16], char id)
