@@ -272,6 +272,9 @@ static hap_status dhd_find(dhd_device *device, const hapi_argument_table *table,
   if (entries[ID].given && (double)id != entries[ID].number[0]) {
     return hapi_arguments_fail(table, &entries[ID], detail);
   }
+  if (entries[LIBRARY].length >= sizeof path) {
+    return hapi_arguments_fail(table, &entries[LIBRARY], detail);
+  }
   snprintf(path, sizeof path, "%.*s", (int)entries[LIBRARY].length,
            entries[LIBRARY].given ? entries[LIBRARY].text : "");
   HAPI_TRY(hapi_dhd_load(path, &device->library, &device->dhd, detail));
@@ -301,7 +304,8 @@ static hap_status dhd_open(void *context, const char *args, void **self, hap_det
 {
   hapi_argument entries[ARGUMENT_COUNT] = {
       [ID] = {"id", HAPI_ARGUMENT_NUMBER, false, 0.0, 15.0, "a whole number from 0 to 15"},
-      [LIBRARY] = {"library", HAPI_ARGUMENT_TEXT, .expected = "the whole path of libdhd.so"},
+      [LIBRARY] = {"library", HAPI_ARGUMENT_TEXT,
+                   .expected = "the whole path of libdhd.so, at most 255 bytes"},
   };
   const hapi_argument_table table = {"forcedimension", entries, ARGUMENT_COUNT};
   (void)context;

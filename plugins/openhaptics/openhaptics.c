@@ -292,6 +292,10 @@ static hap_status hd_find(hd_device *device, const hapi_argument_table *table, h
   char key[NAME_ROOM + 16];
   hapi_relay_settings settings;
   memset(&settings, 0, sizeof settings);
+  if (entries[LIBRARY].length >= sizeof path || entries[NAME].length >= sizeof device->asked) {
+    bool library = entries[LIBRARY].length >= sizeof path;
+    return hapi_arguments_fail(table, &entries[library ? LIBRARY : NAME], detail);
+  }
   snprintf(path, sizeof path, "%.*s", (int)entries[LIBRARY].length,
            entries[LIBRARY].given ? entries[LIBRARY].text : "");
   snprintf(device->asked, sizeof device->asked, "%.*s", (int)entries[NAME].length,
@@ -326,8 +330,10 @@ static void hd_free(hd_device *device)
 static hap_status hd_open(void *context, const char *args, void **self, hap_detail *detail)
 {
   hapi_argument entries[ARGUMENT_COUNT] = {
-      [NAME] = {"name", HAPI_ARGUMENT_TEXT, .expected = "the name of a device in Touch_Setup"},
-      [LIBRARY] = {"library", HAPI_ARGUMENT_TEXT, .expected = "the whole path of libHD.so"},
+      [NAME] = {"name", HAPI_ARGUMENT_TEXT,
+                .expected = "the name of a device in Touch_Setup, at most 63 bytes"},
+      [LIBRARY] = {"library", HAPI_ARGUMENT_TEXT,
+                   .expected = "the whole path of libHD.so, at most 255 bytes"},
   };
   const hapi_argument_table table = {"openhaptics", entries, ARGUMENT_COUNT};
   (void)context;
