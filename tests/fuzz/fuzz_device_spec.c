@@ -15,9 +15,15 @@ static const char places[] = "t,x,y,z\n0,0,0,0\n0.5,0.1,0,0\n1,0.1,-0.2,0.3\n";
 static const char poses[] =
     "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n0.5,0.1,0,0,0.7,0.7,0,0\n1,0,0,1,0,0,-1,0\n";
 
-/* False for a name that could be any file of the machine. */
+/* False for what could be any file of the machine, or any service. */
 static bool is_harmless(const char *spec)
 {
+  static const char *const keys[] = {"library=", "host=", "port="};
+  for (size_t i = 0; i < sizeof keys / sizeof keys[0]; ++i) {
+    if (strstr(spec, keys[i]) != NULL) {
+      return false;
+    }
+  }
   size_t length = strcspn(spec, ":");
   bool file =
       strncmp(spec, REPLAY, strlen(REPLAY)) == 0 || strncmp(spec, MODULE, strlen(MODULE)) == 0;
