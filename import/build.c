@@ -137,25 +137,6 @@ static size_t joints_count(const import_body *body)
   return count;
 }
 
-/* A motor's rotor turns along: exact for a hinge on what never moves. The same about all axes, of
- * which the hinge leaves one, so that it stays the inertia of a real body. */
-static void armature_add(import_work *work, import_body *body)
-{
-  for (const import_joint *joint = body->joints; joint != NULL; joint = joint->next) {
-    if (joint->armature == 0.0) {
-      continue;
-    }
-    if (joint->kind != IMPORT_HINGE || body->joints->next != NULL ||
-        body->parent->carrier->parent != NULL || !(joint->armature > 0.0)) {
-      import_note(work, joint->at, "joint %.60s: armature left out", joint->name);
-      continue;
-    }
-    for (int k = 0; k < 9; k += 4) {
-      body->whole.inertia[k] += joint->armature;
-    }
-  }
-}
-
 static hap_status part_add(import_work *work, import_body *body, const hap_body_def *def,
                            hap_scene *scene, uint32_t *out)
 {
@@ -174,6 +155,23 @@ static void limits_fill(import_work *work, const import_joint *joint, hap_joint_
   out->high[0] = joint->high <= most ? joint->high : INFINITY;
   if ((out->low[0] != joint->low || out->high[0] != joint->high)) {
     import_note(work, joint->at, "joint %.60s: limits beyond half a turn left out", joint->name);
+  }
+}
+
+/* Spring, damper and rotor of a hinge or slider; a word of what another joint has of it. */
+static void spring_fill(import_work *work, const import_joint *joint, hap_joint_def *out)
+{
+  const bool has_axis = joint->kind == IMPORT_HINGE || joint->kind == IMPORT_SLIDER;
+  const double values[] = {joint->stiffness, joint->damping, joint->armature};
+  static const char *const names[] = {"stiffness", "damping", "armature"};
+  double *const to[] = {&out->stiffness, &out->damping, &out->inertia};
+  out->rest = joint->rest;
+  for (int i = 0; i < 3; ++i) {
+    if (has_axis && values[i] >= 0.0 && values[i] <= 1e9) {
+      *to[i] = values[i];
+    } else if (values[i] != 0.0) {
+      import_note(work, joint->at, "joint %.60s: %s left out", joint->name, names[i]);
+    }
   }
 }
 
@@ -199,6 +197,7 @@ static hap_status joint_add(import_work *work, const import_body *body, const im
   } else if (joint->friction > 0.0) {
     import_note(work, joint->at, "joint %.60s: friction of a ball joint left out", joint->name);
   }
+  spring_fill(work, joint, &def);
   hap_status status = hap_scene_add_joint(scene, &def, NULL, &why);
   return status < HAP_OK ? build_fail(work, joint->at, status, &why) : HAP_OK;
 }
@@ -239,7 +238,6 @@ static hap_status carrier_add(import_work *work, const import_model *model, impo
   if (!(body->whole.mass > 0.0)) {
     return import_refuse(work, body->at, "body %.60s moves and has no mass", body->name);
   }
-  armature_add(work, body);
   hap_body_def_init(&def, sizeof def);
   def.pose = body->pose_world;
   const import_joint *joint = body->joints;
@@ -256,6 +254,9 @@ static hap_status carrier_add(import_work *work, const import_model *model, impo
   HAPI_TRY(part_add(work, body, &def, scene, &body->number));
   if (joint->kind != IMPORT_FREE) {
     HAPI_TRY(joint_add(work, body, joint, (const uint32_t[2]){body->number, below}, scene));
+  } else {
+    hap_joint_def none;
+    spring_fill(work, joint, &none);
   }
   if (joints > 1 && parent_number != HAP_SCENE_WORLD) {
     return hap_scene_let_pass(scene, body->number, parent_number, work->detail);

@@ -43,6 +43,41 @@ static hap_status limits_read(mjcf *m, const mjcf_item *item, import_joint *join
   return HAP_OK;
 }
 
+/* A spring and a damper may be polynomials; the linear part is taken. */
+static hap_status linear_read(mjcf *m, const mjcf_item *item, const char *name, double *out)
+{
+  double parts[3] = {0.0, 0.0, 0.0};
+  size_t count;
+  HAPI_TRY(mjcf_numbers(m, item, name, XML_OF(1, 3), parts, &count));
+  if (parts[1] != 0.0 || parts[2] != 0.0) {
+    import_note(m->work, item->element->at, "joint: what is not linear of %s left out", name);
+  }
+  if (parts[0] < 0.0) {
+    import_note(m->work, item->element->at, "joint: %s below 0 left out", name);
+  }
+  *out = fmax(parts[0], 0.0);
+  return HAP_OK;
+}
+
+static hap_status spring_read(mjcf *m, const mjcf_item *item, import_joint *joint)
+{
+  double reference = 0.0;
+  double rest = 0.0;
+  double both[2] = {0.0, 0.0};
+  size_t count;
+  HAPI_TRY(mjcf_number(m, item, "armature", &joint->armature));
+  HAPI_TRY(mjcf_number(m, item, "ref", &reference));
+  HAPI_TRY(mjcf_number(m, item, "springref", &rest));
+  HAPI_TRY(linear_read(m, item, "stiffness", &joint->stiffness));
+  HAPI_TRY(linear_read(m, item, "damping", &joint->damping));
+  HAPI_TRY(mjcf_numbers(m, item, "springdamper", XML_OF(2, 2), both, &count));
+  joint->rest = (rest - reference) * (joint->kind == IMPORT_HINGE ? m->compiler.angle : 1.0);
+  if (both[0] > 0.0 && both[1] > 0.0) {
+    import_note(m->work, item->element->at, "joint: springdamper left out");
+  }
+  return HAP_OK;
+}
+
 hap_status mjcf_read_joint(mjcf *m, const mjcf_item *item, const hap_pose *frame, import_body *body)
 {
   int kind = IMPORT_HINGE;
@@ -80,7 +115,7 @@ hap_status mjcf_read_joint(mjcf *m, const mjcf_item *item, const hap_pose *frame
                           .high = INFINITY};
   HAPI_TRY(mjcf_numbers(m, item, "axis", XML_OF(3, 3), axis, &count));
   HAPI_TRY(mjcf_numbers(m, item, "pos", XML_OF(3, 3), anchor, &count));
-  HAPI_TRY(mjcf_number(m, item, "armature", &joint->armature));
+  HAPI_TRY(spring_read(m, item, joint));
   HAPI_TRY(mjcf_number(m, item, "frictionloss", &joint->friction));
   if (!(joint->friction >= 0.0)) {
     return import_refuse(m->work, item->element->at, "frictionloss: below 0");

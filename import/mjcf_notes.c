@@ -24,7 +24,9 @@ static const mjcf_known elements[] = {
      "name class type contype conaffinity size material rgba friction mass density hfield mesh "
      "fromto group " PLACE,
      "user condim priority solmix solref solimp margin gap"},
-    {"joint", "name class type pos axis limited range ref armature frictionloss",
+    {"joint",
+     "name class type pos axis limited range ref armature frictionloss stiffness "
+     "springref damping springdamper",
      "group user solreffriction solimpfriction solreflimit solimplimit margin "
      "actuatorfrcrange actuatorfrclimited actuatorgravcomp"},
     {"mesh", "name class file vertex face scale refpos refquat",

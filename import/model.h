@@ -70,6 +70,9 @@ typedef struct import_joint {
   double high;
   double friction; /* N or N m */
   double armature; /* kg or kg m^2 */
+  double stiffness;
+  double rest; /* of the spring, as low and high */
+  double damping;
   struct import_joint *next;
 } import_joint;
 

@@ -176,7 +176,6 @@ static hap_status joint_read(urdf *u, const xml_element *element, import_body *b
   const char *type = xml_get(element, "type");
   const char *name = xml_get(element, "name");
   double axis[3] = {1.0, 0.0, 0.0};
-  double damping = 0.0;
   size_t count;
   const xml_element *along = xml_child(element, "axis");
   if (type == NULL || !xml_word_in(type, "fixed floating revolute continuous prismatic planar")) {
@@ -229,12 +228,13 @@ static hap_status joint_read(urdf *u, const xml_element *element, import_body *b
     }
   }
   HAPI_TRY(value_read(u, element, "dynamics", "friction", &joint->friction));
-  HAPI_TRY(value_read(u, element, "dynamics", "damping", &damping));
+  HAPI_TRY(value_read(u, element, "dynamics", "damping", &joint->damping));
   if (!(joint->friction >= 0.0)) {
     return import_refuse(u->work, element->at, "friction: below 0");
   }
-  if (damping != 0.0) {
-    import_note(u->work, element->at, "joint %.60s: damping left out", joint->name);
+  if (joint->damping < 0.0) {
+    import_note(u->work, element->at, "joint %.60s: damping below 0 left out", joint->name);
+    joint->damping = 0.0;
   }
   body->joints = joint;
   return HAP_OK;

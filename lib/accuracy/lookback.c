@@ -168,6 +168,7 @@ static bool row_go_over(hapi_lookback *w, const hapi_cycle *as_single, double ha
     }
     window_collide(w, as_single);
     ++w->counts.steps;
+    hapi_springs_set(w->test.world->springs, period);
     dWorldQuickStep(w->test.world->ode.world, period);
     if (!window_is_sound(w)) {
       return false;

@@ -34,7 +34,8 @@ enum {
   PART_ANCHOR = 0,
   PART_TURN = 3,
   PART_GIVEN = 6,
-  PART_AXIS = 7 /* three for each: motor, low stop, high stop */
+  PART_AXIS = 7, /* PARTS_OF_AXIS for each: motor, low stop, high stop, spring */
+  PARTS_OF_AXIS = 4
 };
 
 typedef struct placed_joint {
@@ -447,7 +448,7 @@ static hapi_row *axis_row(hapi_rows *rows, const placed_joint *j, int which, int
 {
   double direction[3];
   hapi_v3_scale(sign, j->axes[which], direction);
-  part += PART_AXIS + 3 * which;
+  part += PART_AXIS + PARTS_OF_AXIS * which;
   if (j->in->kind == HAPI_JOINT_MEASURED && j->in->measured.axes[which].slides) {
     return measured_slide(rows, j, part, direction);
   }
@@ -487,6 +488,20 @@ static void add_locked(hapi_rows *rows, double period, const placed_joint *j, in
 static double speed_of(const placed_joint *j, const hapi_row *row)
 {
   return hapi_row_start_speed(j->a, row->ja) + hapi_row_start_speed(j->b, row->jb);
+}
+
+static void add_spring(hapi_rows *rows, double period, const placed_joint *j, int which,
+                       double position)
+{
+  double cfm;
+  hapi_row *row = axis_row(rows, j, which, 3, 1.0);
+  if (row != NULL) {
+    double mobility = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);
+    hapi_axis_spring_row(&j->in->limits[which].spring, period, mobility, position, speed_of(j, row),
+                         &row->target, &cfm);
+    newest_source(rows)->gives = true;
+    finish_row(rows, period, cfm);
+  }
 }
 
 /* Speed after the tick if the stop were not there, with the impulses of the last tick: what presses
@@ -553,6 +568,9 @@ static void add_limits(hapi_rows *rows, const hapi_tick_facts *facts, const plac
     }
     if ((limit->flags & HAPI_LIMIT_MOTOR) != 0) {
       add_motor(rows, facts->period, j, which, position);
+    }
+    if ((limit->flags & HAPI_LIMIT_SPRING) != 0) {
+      add_spring(rows, facts->period, j, which, position);
     }
     if ((limit->flags & HAPI_LIMIT_LOW) != 0) {
       add_stop(rows, facts, j, which, position - limit->low, 1.0);
@@ -732,7 +750,7 @@ static bool joint_tells(const hapi_joints *joints, const hapi_bodies *bodies, ui
 /* ODE gives the force of a motor at its stop to the bodies, not to the joint. */
 static bool is_motor_on_stop(const hapi_joint_memory *memory, int part)
 {
-  return part >= PART_AXIS && (part - PART_AXIS) % 3 == 0 &&
+  return part >= PART_AXIS && (part - PART_AXIS) % PARTS_OF_AXIS == 0 &&
          (memory->impulse[part + 1] != 0.0 || memory->impulse[part + 2] != 0.0);
 }
 

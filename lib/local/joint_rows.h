@@ -9,7 +9,7 @@
 #include "local/rows.h"
 #include "sync/messages.h"
 
-#define HAPI_JOINT_PARTS 16 /* six that hold, one given, motor and stops of three axes */
+#define HAPI_JOINT_PARTS 19 /* six that hold, one given, four of each of three axes */
 #define HAPI_JOINT_ROWS 10u /* at once */
 
 /* What is kept of a joint, by slot. */

@@ -81,6 +81,9 @@ static bool add_joint(hapi_nearby *nearby, dJointID joint)
   }
   hapi_known_joint *known = &nearby->world->joints.entries[index];
   bool others = known->bodies[1] != NULL;
+  if (known->helps) {
+    return true;
+  }
   if (!has_rows(nearby, known) || known->index[0] == HAPI_NONE ||
       (others && known->index[1] == HAPI_NONE)) {
     return false;

@@ -139,6 +139,11 @@ void hapi_physics_destroy(hapi_physics *physics)
   hapi_free(physics);
 }
 
+void hapi_physics_set_springs(hapi_physics *physics, const hapi_springs *springs)
+{
+  physics->world.springs = springs;
+}
+
 static void give_world_back(hapi_physics *physics)
 {
   dJointGroupEmpty(physics->world.contact_group); /* joints of a world that is gone, too */

@@ -33,6 +33,10 @@ void hapi_physics_destroy(hapi_physics *physics); /* NULL allowed; ended before 
 const struct hapi_contact_caller *hapi_physics_caller(const hapi_physics *physics);
 bool hapi_physics_asks(const hapi_physics *physics); /* whether there is anybody */
 
+struct hapi_springs;
+/* [control] Before begin: the springs on the axes of the world's joints; they stay the caller's. */
+void hapi_physics_set_springs(hapi_physics *physics, const struct hapi_springs *springs);
+
 /* [control] Takes the world over and builds the first local model; *start_ns is the time for which
  * it holds: 0 in lockstep, else now. */
 hap_status hapi_physics_begin(hapi_physics *physics, int64_t *start_ns, hap_detail *detail);

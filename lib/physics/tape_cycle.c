@@ -201,6 +201,11 @@ static uint64_t hash_joint(uint64_t hash, const hapi_model_joint *j)
     const double values[] = {l->low, l->high, l->bounce, l->speed, l->force};
     hash = hapi_hash_word(hash, l->flags);
     hash = hapi_hash_doubles(hash, values, sizeof values / sizeof values[0]);
+    if ((l->flags & HAPI_LIMIT_SPRING) != 0) {
+      const double spring[] = {l->spring.stiffness, l->spring.rest, l->spring.damping,
+                               l->spring.inertia};
+      hash = hapi_hash_doubles(hash, spring, sizeof spring / sizeof spring[0]);
+    }
   }
   return hash;
 }

@@ -377,6 +377,7 @@ void hapi_test_step(hapi_test_set *test)
 {
   HAPI_ASSERT(test->entered && test->step_s > 0.0);
   ++test->steps;
+  hapi_springs_set(test->world->springs, test->step_s);
   dWorldQuickStep(test->world->ode.world, test->step_s);
 }
 

@@ -362,6 +362,11 @@ void hapi_scene_joint_set(const hapi_scene_joint *joint, int parameter, uint32_t
   makings[joint->kind].set_parameter(joint->joint, parameter + (int)axis * dParamGroup, value);
 }
 
+static hapi_axis_spring spring_of(const hap_joint_def *def)
+{
+  return (hapi_axis_spring){def->stiffness, def->rest, def->damping, def->inertia};
+}
+
 /* Of the free axes: whether stops and motor can be. */
 static hap_status axes_check(const hap_joint_def *def, hap_detail *detail)
 {
@@ -387,6 +392,24 @@ static hap_status axes_check(const hap_joint_def *def, hap_detail *detail)
   return HAP_OK;
 }
 
+static hap_status spring_check(const hap_joint_def *def, hap_detail *detail)
+{
+  const hapi_number_rule rules[] = {
+      HAPI_RULE(def, stiffness, 0.0, 1e9),
+      HAPI_RULE(def, rest, -1e6, 1e6),
+      HAPI_RULE(def, damping, 0.0, 1e9),
+      HAPI_RULE(def, inertia, 0.0, 1e9),
+  };
+  const hapi_axis_spring spring = spring_of(def);
+  HAPI_TRY(hapi_numbers_check(rules, sizeof rules / sizeof rules[0], detail));
+  if (hapi_axis_spring_acts(&spring) && def->kind != HAP_JOINT_HINGE &&
+      def->kind != HAP_JOINT_SLIDER) {
+    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                     "stiffness, damping and inertia are of HINGE and SLIDER only");
+  }
+  return HAP_OK;
+}
+
 static hap_status joint_check(const hap_scene *scene, const hap_joint_def *def, hap_detail *detail)
 {
   if ((int)def->kind < HAP_JOINT_BALL || def->kind >= HAP_JOINT_OTHER) {
@@ -404,7 +427,8 @@ static hap_status joint_check(const hap_scene *scene, const hap_joint_def *def, 
   if (!hapi_plausible(def->anchor, 3)) {
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "anchor: not finite or beyond 1000 km");
   }
-  return axes_check(def, detail);
+  HAPI_TRY(axes_check(def, detail));
+  return spring_check(def, detail);
 }
 
 static void joint_make(hap_scene *scene, const hap_joint_def *def, hapi_scene_joint *out)
@@ -435,6 +459,10 @@ static void joint_make(hap_scene *scene, const hap_joint_def *def, hapi_scene_jo
     hapi_scene_joint_set(out, dParamVel, i, def->motor_speed[i]);
     hapi_scene_joint_set(out, dParamFMax, i, def->motor_force[i]);
   }
+  const hapi_axis_spring spring = spring_of(def);
+  if (hapi_axis_spring_acts(&spring)) {
+    hapi_spring_make(&scene->springs, scene->world, out->joint, &spring);
+  }
 }
 
 hap_status hap_scene_add_joint(hap_scene *scene, const hap_joint_def *given, uint32_t *out_joint,
@@ -448,7 +476,9 @@ hap_status hap_scene_add_joint(hap_scene *scene, const hap_joint_def *given, uin
   HAPI_TRY(joint_check(scene, &def, detail));
   HAPI_TRY(hapi_scene_may_edit(scene, detail));
   if (!hapi_reserve((void **)&scene->joints, &scene->joint_capacity, scene->joint_count, 1,
-                    sizeof *scene->joints)) {
+                    sizeof *scene->joints) ||
+      !hapi_reserve((void **)&scene->springs.of, &scene->springs.capacity, scene->springs.count, 1,
+                    sizeof *scene->springs.of)) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a joint");
   }
   joint_make(scene, &def, &scene->joints[scene->joint_count]);
@@ -461,8 +491,9 @@ hap_status hap_scene_add_joint(hap_scene *scene, const hap_joint_def *given, uin
 
 /* ---- and go ---- */
 
-static void joint_remove(hapi_scene_joint *joint)
+static void joint_remove(hap_scene *scene, hapi_scene_joint *joint)
 {
+  hapi_spring_remove(&scene->springs, joint->joint);
   dJointDestroy(joint->joint);
   joint->joint = NULL;
 }
@@ -486,7 +517,7 @@ hap_status hap_scene_remove_body(hap_scene *scene, uint32_t number)
     hapi_scene_joint *joint = hapi_scene_joint_at(scene, i);
     if (joint != NULL && (dJointGetBody(joint->joint, 0) == body->body ||
                           dJointGetBody(joint->joint, 1) == body->body)) {
-      joint_remove(joint);
+      joint_remove(scene, joint);
     }
   }
   if (scene->session != NULL) {
@@ -523,6 +554,6 @@ hap_status hap_scene_remove_joint(hap_scene *scene, uint32_t number)
     return scene == NULL ? HAP_ERROR_ARGUMENT : HAP_ERROR_NOT_FOUND;
   }
   HAPI_TRY(hapi_scene_may_edit(scene, NULL));
-  joint_remove(joint);
+  joint_remove(scene, joint);
   return HAP_OK;
 }

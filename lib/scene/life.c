@@ -59,6 +59,7 @@ hap_status hap_scene_destroy(hap_scene *scene)
   hapi_free(scene->bodies);
   hapi_free(scene->geoms);
   hapi_free(scene->joints);
+  hapi_free(scene->springs.of);
   hapi_free(scene->passes);
   hapi_free(scene);
   dCloseODE();

@@ -191,6 +191,7 @@ hap_status hap_scene_session(hap_scene *scene, const hap_session_def *def, hap_s
     *out = NULL;
     return status;
   }
+  hapi_physics_set_springs((*out)->physics, &scene->springs);
   scene->session = *out;
   (*out)->gone = (hapi_session_gone){session_gone, scene};
   return HAP_OK;

@@ -12,6 +12,7 @@
 #include <hapode/scene.h>
 
 #include "base/def.h"
+#include "world/springs.h"
 
 struct scene;
 
@@ -64,6 +65,7 @@ struct hap_scene {
   uint32_t geom_capacity;
   uint32_t joint_count;
   uint32_t joint_capacity;
+  hapi_springs springs;    /* on axes of the joints */
   hapi_scene_pass *passes; /* rising by a, then b */
   uint32_t pass_count;
   uint32_t pass_capacity;

@@ -5,6 +5,7 @@
 
 /* physics -> haptic: the local model. */
 
+#include "base/axis_spring.h"
 #include "proximity/ball_among.h"
 #include "proximity/patch.h"
 #include "sync/feel.h"
@@ -24,10 +25,11 @@ enum {
   HAPI_LIMIT_LOW = 1, /* there is such a stop */
   HAPI_LIMIT_HIGH = 2,
   HAPI_LIMIT_LOCKED = 4, /* both at the same place: neither stop nor motor */
-  HAPI_LIMIT_MOTOR = 8
+  HAPI_LIMIT_MOTOR = 8,
+  HAPI_LIMIT_SPRING = 16
 };
 
-/* Stops and motor of one free axis. Positions as ODE measures them: how far the first body is
+/* Stops, motor and spring of one free axis. Positions as ODE measures them: how far the first body is
  * turned or moved against the second one, rad or m. */
 typedef struct hapi_model_limit {
   uint32_t flags;
@@ -39,6 +41,7 @@ typedef struct hapi_model_limit {
   double force;     /* its largest torque or force: N m, N */
   double motor_cfm; /* (rad/s)/(N m), (m/s)/N: the same at every step */
   double fudge;     /* share of the force while it drives away from a stop */
+  hapi_axis_spring spring;
 } hapi_model_limit;
 
 typedef enum hapi_joint_kind {

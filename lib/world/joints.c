@@ -212,6 +212,7 @@ static void joint_see(hapi_world *world, dJointID joint)
     bool near =
         is_local(&world->bodies, known->index[0]) || is_local(&world->bodies, known->index[1]);
     known->seen = world->joints.scan;
+    known->helps = hapi_spring_is_motor(world->springs, joint);
     const hapi_joint_traits *traits = hapi_joint_traits_of(known->joint);
     known->carried = traits != NULL && traits->kind != HAPI_JOINT_MEASURED;
     known->kind = known->carried ? traits->kind : known->kind;

@@ -43,8 +43,9 @@ typedef struct hapi_known_joint {
   dBodyID bodies[2]; /* in ODE's own order; the second is NULL: static world */
   uint32_t index[2]; /* of the body table, in this cycle */
   bool carried;      /* of a kind that the loop has */
-  bool usable;       /* place holds */
-  bool held;         /* switched off for the global step */
+  bool helps;  /* the motor of a spring: the loop has it with the joint that the spring is on */
+  bool usable; /* place holds */
+  bool held;   /* switched off for the global step */
   bool left_is_known;
   hapi_joint_kind kind;
   hapi_joint_place place; /* as it was set */

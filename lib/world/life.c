@@ -170,5 +170,6 @@ void hapi_world_step(hapi_world *world, double step_s)
 {
   HAPI_ASSERT(step_s > 0.0);
   ++world->counts.steps;
+  hapi_springs_set(world->springs, step_s);
   dWorldQuickStep(world->ode.world, step_s);
 }

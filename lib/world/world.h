@@ -18,6 +18,7 @@
 #include "world/cycle.h"
 #include "world/joints.h"
 #include "world/spaces.h"
+#include "world/springs.h"
 #include "world/surfaces.h"
 
 /* Standard gravity, for the smallest perturbation of a testing simulation. */
@@ -63,6 +64,7 @@ struct hapi_world {
   hapi_awake awake;
   hapi_carriers carriers;
   hapi_joint_table joints;
+  const hapi_springs *springs; /* of whoever made the world; NULL: it has none */
   hapi_surface_cache *surfaces;
   hapi_contact_notes *notes;
   hapi_world_asking *asking;
