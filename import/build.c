@@ -47,6 +47,14 @@ static bool geom_fill(const import_geom *geom, const hap_pose *frame, hap_geom_d
       out->shape = HAP_SHAPE_BOX;
       hapi_v3_scale(2.0, s, out->edges);
       return true;
+    case IMPORT_FIELD:
+      out->shape = HAP_SHAPE_FIELD;
+      out->edges[0] = 2.0 * s[0];
+      out->edges[1] = 2.0 * s[1];
+      out->heights = geom->field->heights;
+      out->columns = geom->field->columns;
+      out->rows = geom->field->rows;
+      return true;
     case IMPORT_ELLIPSOID:
     case IMPORT_MESH:
       out->shape = HAP_SHAPE_MESH;
@@ -103,9 +111,10 @@ static size_t geoms_fill(import_work *work, const import_model *model, const imp
     }
     hapi_pose_into(frame->position, frame->quat_wxyz, &body->pose_world, &inside);
     for (const import_geom *geom = body->geoms; geom != NULL; geom = geom->next) {
-      if (geom->shape == IMPORT_PLANE || !geom_fill(geom, &inside, &out[count])) {
+      const bool stands = geom->shape == IMPORT_PLANE || geom->shape == IMPORT_FIELD;
+      if (stands || !geom_fill(geom, &inside, &out[count])) {
         import_note(work, geom->at, "geom left out: %s",
-                    geom->shape == IMPORT_PLANE ? "a plane of a body that moves" : "its shape");
+                    stands ? "a plane or height field of a body that moves" : "its shape");
       } else {
         ++count;
       }
@@ -126,6 +135,43 @@ static void mass_fill(const import_mass *mass, double share, hap_body_def *out)
       out->inertia[i][k] = 0.5 * share * (mass->inertia[3 * i + k] + mass->inertia[3 * k + i]);
     }
   }
+}
+
+/* Whether a body can have it: it and the moments of its mass along the axes are positive. */
+static bool inertia_is_real(const double m[9])
+{
+  const double half = 0.5 * (m[0] + m[4] + m[8]);
+  const double slack = 1e-9 * half; /* a thin plate has none along one axis */
+  for (int k = 0; k < 2; ++k) {     /* m, then half * 1 - m */
+    const double s = k == 0 ? 1.0 : -1.0;
+    const double add = k == 0 ? 0.0 : half + slack;
+    const double a[3] = {s * m[0] + add, s * m[4] + add, s * m[8] + add};
+    const double b[3] = {s * m[1], s * m[2], s * m[5]}; /* xy, xz, yz */
+    const double all = a[0] * (a[1] * a[2] - b[2] * b[2]) - b[0] * (b[0] * a[2] - b[2] * b[1]) +
+                       b[1] * (b[0] * b[2] - a[1] * b[1]);
+    if (!(a[0] > 0.0 && a[0] * a[1] - b[0] * b[0] > 0.0 && all > 0.0)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* Where it is the mean of the moments is about all axes; where that is nothing, that of a ball of
+ * the mass. */
+static void inertia_mend(import_work *work, import_body *body)
+{
+  double *m = body->whole.inertia;
+  if (inertia_is_real(m)) {
+    return;
+  }
+  const double mean = (m[0] + m[4] + m[8]) / 3.0;
+  const double ball =
+      0.4 * body->whole.mass * pow(body->whole.mass / (1000.0 * 4.18879), 2.0 / 3.0);
+  const bool some = mean > 1e-6 * ball;
+  memset(m, 0, 9 * sizeof *m);
+  m[0] = m[4] = m[8] = some ? mean : ball;
+  import_note(work, body->at, "body %.60s: no body has such an inertia, %g kg m^2 %s instead",
+              body->name, m[0], some ? "about all axes" : "of a ball of its mass");
 }
 
 static size_t joints_count(const import_body *body)
@@ -235,9 +281,7 @@ static hap_status carrier_add(import_work *work, const import_model *model, impo
   if (geoms == NULL) {
     return import_no_memory(work);
   }
-  if (!(body->whole.mass > 0.0)) {
-    return import_refuse(work, body->at, "body %.60s moves and has no mass", body->name);
-  }
+  inertia_mend(work, body);
   hap_body_def_init(&def, sizeof def);
   def.pose = body->pose_world;
   const import_joint *joint = body->joints;
@@ -306,8 +350,27 @@ static hap_status holds_add(import_work *work, const import_model *model, hap_sc
   return HAP_OK;
 }
 
+/* What has no mass cannot move by itself: it goes with what carries it. */
+static void massless_hold(import_work *work, import_model *model)
+{
+  bool held = false;
+  for (import_body *body = model->bodies->next; body != NULL; body = body->next) {
+    const bool moves = body->carrier == body && !body_is_nothing(model, body);
+    if (moves && !(body->whole.mass > 0.0)) {
+      import_note(work, body->at, "body %.60s moves and has no mass: its joint left out",
+                  body->name);
+      body->joints = NULL;
+      held = true;
+    }
+  }
+  if (held) {
+    import_model_join(model);
+  }
+}
+
 hap_status import_build(import_work *work, import_model *model, hap_scene *scene)
 {
+  massless_hold(work, model);
   for (import_body *body = model->bodies; body != NULL; body = body->next) {
     if (body->carrier->parent == NULL) {
       HAPI_TRY(fixed_geoms_add(work, body, scene));

@@ -131,9 +131,26 @@ static void surface_middle(const import_mesh *mesh, double out[3])
   hapi_v3_scale(area > 0.0 ? 1.0 / area : 0.0, sum, out);
 }
 
-/* Sums of x_a x_b over the pyramids from a point. */
-static void products_sum(const import_mesh *mesh, const double centre[3], double out[9])
+/* What a triangle counts: the pyramid from a point over it, or its area. middle: from the point. */
+static double triangle_share(import_filling filling, const double middle[3], const double normal[3])
 {
+  const double volume = hapi_v3_dot(middle, normal) / 6.0;
+  switch (filling) {
+    case IMPORT_FILLED_TWICE:
+      return fabs(volume);
+    case IMPORT_FILLED:
+      return volume;
+    case IMPORT_SHELL:
+      break;
+  }
+  return 0.5 * hapi_v3_norm(normal);
+}
+
+/* Sums of x_a x_b over all from a point; returns what they count together. */
+static double products_sum(const import_mesh *mesh, import_filling filling, const double centre[3],
+                           double out[9])
+{
+  double all = 0.0;
   memset(out, 0, 9 * sizeof *out);
   for (size_t i = 0; i < mesh->triangle_count; ++i) {
     double c[3][3];
@@ -141,7 +158,8 @@ static void products_sum(const import_mesh *mesh, const double centre[3], double
     double normal[3];
     triangle_read(mesh, i, c, middle, normal);
     hapi_v3_sub(middle, centre, middle);
-    double volume = fabs(hapi_v3_dot(middle, normal)) / 6.0;
+    const double share = triangle_share(filling, middle, normal);
+    all += share;
     for (int k = 0; k < 3; ++k) {
       hapi_v3_sub(c[k], centre, c[k]);
     }
@@ -150,17 +168,19 @@ static void products_sum(const import_mesh *mesh, const double centre[3], double
         const double sum_a = c[0][a] + c[1][a] + c[2][a];
         const double sum_b = c[0][b] + c[1][b] + c[2][b];
         const double own = c[0][a] * c[0][b] + c[1][a] * c[1][b] + c[2][a] * c[2][b];
-        out[3 * a + b] += volume / 20.0 * (own + sum_a * sum_b);
+        out[3 * a + b] += share / (filling == IMPORT_SHELL ? 12.0 : 20.0) * (own + sum_a * sum_b);
       }
     }
   }
+  return all;
 }
 
-void import_mesh_mass(const import_mesh *mesh, double density, import_mass *out)
+void import_mesh_mass(const import_mesh *mesh, import_filling filling, double density,
+                      import_mass *out)
 {
   double from[3];
   double p[9];
-  double volume = 0.0;
+  double all = 0.0;
   double sum[3] = {0.0, 0.0, 0.0};
   surface_middle(mesh, from);
   for (size_t i = 0; i < mesh->triangle_count; ++i) {
@@ -170,18 +190,19 @@ void import_mesh_mass(const import_mesh *mesh, double density, import_mass *out)
     double off[3];
     triangle_read(mesh, i, corners, middle, normal);
     hapi_v3_sub(middle, from, off);
-    double share = fabs(hapi_v3_dot(off, normal)) / 6.0;
-    volume += share;
+    const double share = triangle_share(filling, off, normal);
+    const double near = filling == IMPORT_SHELL ? 0.0 : 0.25; /* of the pyramid's point */
+    all += share;
     for (int k = 0; k < 3; ++k) {
-      sum[k] += share * (0.75 * middle[k] + 0.25 * from[k]);
+      sum[k] += share * ((1.0 - near) * middle[k] + near * from[k]);
     }
   }
-  *out = (import_mass){.mass = density * volume};
-  if (!(volume > 0.0)) {
+  *out = (import_mass){.mass = 0.0};
+  if (!(all > 0.0)) {
     return;
   }
-  hapi_v3_scale(1.0 / volume, sum, out->centre);
-  products_sum(mesh, out->centre, p);
+  hapi_v3_scale(1.0 / all, sum, out->centre);
+  out->mass = density * products_sum(mesh, filling, out->centre, p);
   const double trace = p[0] + p[4] + p[8];
   for (int k = 0; k < 9; ++k) {
     out->inertia[k] = density * ((k % 4 == 0 ? trace : 0.0) - p[k]);

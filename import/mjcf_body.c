@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/log.h"
@@ -8,12 +9,14 @@
 #include "import/mjcf_internal.h"
 
 #define BODIES_MOST 10000u
+#define COPIES_MOST 10000u /* by <replicate>, all together */
 
 /* Where the children of an element are put. */
 typedef struct mjcf_place {
   import_body *body;
   const mjcf_class *childclass;
-  hap_pose frame; /* in the body */
+  hap_pose frame;     /* in the body */
+  const char *suffix; /* of names, by <replicate> */
 } mjcf_place;
 
 static hap_status children_read(mjcf *m, const xml_element *element, const mjcf_place *place);
@@ -57,20 +60,36 @@ static hap_status inertial_read(mjcf *m, const xml_element *element, const mjcf_
   return HAP_OK;
 }
 
+/* NULL: no memory. */
+static const char *name_join(mjcf *m, const char *name, const char *suffix)
+{
+  const size_t length = strlen(name);
+  if (suffix[0] == '\0') {
+    return name;
+  }
+  char *joined = import_take(m->work, length + strlen(suffix) + 1);
+  if (joined != NULL) {
+    memcpy(joined, name, length);
+    memcpy(joined + length, suffix, strlen(suffix));
+  }
+  return joined;
+}
+
 static hap_status body_read(mjcf *m, const xml_element *element, const mjcf_place *place)
 {
   const mjcf_item item = {element, NULL};
   const char *name = xml_get(element, "name");
-  mjcf_place inside = {.frame = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
+  mjcf_place inside = {.frame = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}, .suffix = place->suffix};
   if (++m->bodies > BODIES_MOST) {
     return import_refuse(m->work, element->at, "more than 10000 bodies");
   }
   import_body *body = import_take(m->work, sizeof *body);
-  if (body == NULL) {
+  name = name != NULL ? name_join(m, name, place->suffix) : "";
+  if (body == NULL || name == NULL) {
     return import_no_memory(m->work);
   }
   *body = (import_body){.at = element->at,
-                        .name = name != NULL ? name : "",
+                        .name = name,
                         .parent = place->body,
                         .mass_given = m->compiler.inertia_from == MJCF_FROM_INERTIAL};
   m->last_body->next = body;
@@ -92,6 +111,57 @@ static hap_status frame_read(mjcf *m, const xml_element *element, const mjcf_pla
   return children_read(m, element, &inside);
 }
 
+/* Names of a copy end in its number, with as many digits as the count has. */
+static const char *copy_suffix(mjcf *m, const mjcf_item *item, int count, int number,
+                               const char *outer)
+{
+  char digits[16];
+  char width[16];
+  const char *separator = xml_get(item->element, "sep");
+  const int most = snprintf(width, sizeof width, "%d", count);
+  (void)snprintf(digits, sizeof digits, "%0*d", most, number);
+  const char *own = name_join(m, separator != NULL ? separator : "", digits);
+  return own != NULL ? name_join(m, own, outer) : NULL;
+}
+
+/* Each copy is placed in the frame of the one before it. */
+static hap_status replicate_read(mjcf *m, const xml_element *element, const mjcf_place *place)
+{
+  const mjcf_item item = {element, NULL};
+  double count = 0.0;
+  double offset[3] = {0.0, 0.0, 0.0};
+  double euler[3] = {0.0, 0.0, 0.0};
+  double at[3] = {0.0, 0.0, 0.0};
+  size_t given;
+  mjcf_place inside = *place;
+  HAPI_TRY(mjcf_number(m, &item, "count", &count));
+  HAPI_TRY(mjcf_numbers(m, &item, "offset", XML_OF(3, 3), offset, &given));
+  HAPI_TRY(mjcf_numbers(m, &item, "euler", XML_OF(3, 3), euler, &given));
+  HAPI_TRY(mjcf_find_class(m, element, "childclass", place->childclass, &inside.childclass));
+  if (!(count >= 1.0 && count <= (double)COPIES_MOST)) {
+    return import_refuse(m->work, element->at, "count: not within 1 and 10000");
+  }
+  for (int i = 0; i < (int)count; ++i) {
+    const double turned[3] = {i * euler[0], i * euler[1], i * euler[2]};
+    double step[3];
+    hap_pose own = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
+    if (++m->replicas > COPIES_MOST) {
+      return import_refuse(m->work, element->at, "more than 10000 copies");
+    }
+    hapi_v3_copy(at, own.position);
+    mjcf_turn_euler(m, turned, own.quat_wxyz);
+    import_pose_join(&place->frame, &own, &inside.frame);
+    inside.suffix = copy_suffix(m, &item, (int)count, i, place->suffix);
+    if (inside.suffix == NULL) {
+      return import_no_memory(m->work);
+    }
+    HAPI_TRY(children_read(m, element, &inside));
+    hapi_quat_rotate(own.quat_wxyz, offset, step);
+    hapi_v3_add(at, step, at);
+  }
+  return HAP_OK;
+}
+
 static hap_status child_read(mjcf *m, const xml_element *child, const mjcf_place *place)
 {
   mjcf_item item;
@@ -100,6 +170,9 @@ static hap_status child_read(mjcf *m, const xml_element *child, const mjcf_place
   }
   if (xml_is(child, "frame")) {
     return frame_read(m, child, place);
+  }
+  if (xml_is(child, "replicate")) {
+    return replicate_read(m, child, place);
   }
   if (xml_is(child, "inertial")) {
     return inertial_read(m, child, place);
@@ -129,7 +202,8 @@ static hap_status children_read(mjcf *m, const xml_element *element, const mjcf_
 
 hap_status mjcf_read_worldbody(mjcf *m, const xml_element *worldbody)
 {
-  mjcf_place world = {.body = m->model->bodies, .frame = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
+  mjcf_place world = {
+      .body = m->model->bodies, .frame = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}, .suffix = ""};
   HAPI_TRY(mjcf_find_class(m, worldbody, "childclass", m->classes, &world.childclass));
   return children_read(m, worldbody, &world);
 }

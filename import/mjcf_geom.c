@@ -26,7 +26,7 @@ enum {
 
 static const int shapes[] = {
     [TYPE_PLANE] = IMPORT_PLANE,
-    [TYPE_HFIELD] = -1,
+    [TYPE_HFIELD] = IMPORT_FIELD,
     [TYPE_SPHERE] = IMPORT_SPHERE,
     [TYPE_CAPSULE] = IMPORT_CAPSULE,
     [TYPE_ELLIPSOID] = IMPORT_ELLIPSOID,
@@ -41,6 +41,7 @@ static size_t sizes_of(int shape)
   switch (shape) {
     case IMPORT_PLANE:
     case IMPORT_MESH:
+    case IMPORT_FIELD:
       return 0;
     case IMPORT_SPHERE:
       return 1;
@@ -63,7 +64,7 @@ static hap_status ends_read(mjcf *m, const mjcf_item *item, import_geom *geom, b
   if (count == 0) {
     return HAP_OK;
   }
-  if (geom->shape == IMPORT_SPHERE || geom->shape == IMPORT_PLANE) {
+  if (geom->shape == IMPORT_SPHERE || geom->shape == IMPORT_PLANE || geom->shape == IMPORT_FIELD) {
     return import_refuse(m->work, item->element->at, "fromto: of no such geom");
   }
   hapi_v3_sub(ends, ends + 3, along);
@@ -183,15 +184,19 @@ static import_geom *geom_add(mjcf *m, import_body *body)
 
 /* The mesh of a geom that has one; *out_why not NULL: the geom is left out. */
 static hap_status surface_read(mjcf *m, const mjcf_item *item, int shape, const mjcf_mesh **out,
-                               const char **out_why)
+                               const mjcf_field **out_field, const char **out_why)
 {
   *out = NULL;
+  *out_field = NULL;
   *out_why = NULL;
   if (shape < 0) {
     *out_why = "of no such shape";
   } else if (shape == IMPORT_MESH) {
     HAPI_TRY(mjcf_find_mesh(m, item, out));
     *out_why = (*out)->hull == NULL ? "its mesh is" : NULL;
+  } else if (shape == IMPORT_FIELD) {
+    HAPI_TRY(mjcf_find_field(m, item, out_field));
+    *out_why = (*out_field)->field == NULL ? "its height field is" : NULL;
   } else if (mjcf_get(m, item, "mesh") != NULL) {
     *out_why = "its size is that of a mesh";
   }
@@ -204,8 +209,9 @@ hap_status mjcf_read_geom(mjcf *m, const mjcf_item *item, const hap_pose *frame,
   const char *name = xml_get(item->element, "name");
   HAPI_TRY(mjcf_word(m, item, "type", TYPES, &type));
   const mjcf_mesh *mesh;
+  const mjcf_field *field;
   const char *why;
-  HAPI_TRY(surface_read(m, item, shapes[type], &mesh, &why));
+  HAPI_TRY(surface_read(m, item, shapes[type], &mesh, &field, &why));
   if (why != NULL) {
     import_note(m->work, item->element->at, "geom %.60s left out, and its mass: %s",
                 name != NULL ? name : "without a name", why);
@@ -226,6 +232,10 @@ hap_status mjcf_read_geom(mjcf *m, const mjcf_item *item, const hap_pose *frame,
   geom->mesh = mesh != NULL                      ? mesh->hull
                : geom->shape == IMPORT_ELLIPSOID ? import_ellipsoid(m->work, geom->size, &why)
                                                  : NULL;
+  if (field != NULL) {
+    geom->field = field->field;
+    memcpy(geom->size, field->size, 2 * sizeof geom->size[0]);
+  }
   HAPI_TRY(mass_read(m, item, mesh, geom));
   HAPI_TRY(colour_read(m, item, geom));
   return contact_read(m, item, geom);

@@ -49,6 +49,14 @@ typedef struct mjcf_mesh {
   struct mjcf_mesh *next;
 } mjcf_mesh;
 
+/* Likewise. */
+typedef struct mjcf_field {
+  const xml_element *element;
+  const import_field *field; /* NULL: it was left out */
+  double size[4];            /* half edges, height, depth of the base */
+  struct mjcf_field *next;
+} mjcf_field;
+
 typedef struct mjcf {
   import_work *work;
   import_model *model;
@@ -57,9 +65,11 @@ typedef struct mjcf {
   mjcf_class *classes; /* the first is main */
   mjcf_section *sections;
   mjcf_mesh *meshes;
+  mjcf_field *fields;
   import_body *last_body;
   size_t bodies;
-  size_t things; /* geoms and joints */
+  size_t things;   /* geoms and joints */
+  size_t replicas; /* of <replicate> */
 } mjcf;
 
 /* An element with what its class adds. */
@@ -99,6 +109,18 @@ void mjcf_turn_euler(const mjcf *m, const double angles[3], double out_quat[4]);
 
 /* The mesh that a geom names; refused where there is none. */
 HAP_NODISCARD hap_status mjcf_find_mesh(mjcf *m, const mjcf_item *geom, const mjcf_mesh **out);
+
+/* The element of the <asset> section of that name, or of a file of that name. NULL: there is none.
+ */
+const xml_element *mjcf_asset(const mjcf *m, const char *kind, const char *name);
+/* All numbers of an attribute. */
+HAP_NODISCARD hap_status mjcf_list(mjcf *m, const xml_element *element, const char *name,
+                                   double **out, size_t *out_count);
+
+/* ---- mjcf_field.c ---- */
+
+/* The height field that a geom names; refused where there is none. */
+HAP_NODISCARD hap_status mjcf_find_field(mjcf *m, const mjcf_item *geom, const mjcf_field **out);
 
 /* ---- mjcf_geom.c, mjcf_joint.c, mjcf_body.c ---- */
 

@@ -14,7 +14,7 @@
 #define NUMBERS_MOST 3000000u
 
 /* "folder/wheel.stl" is called wheel. */
-static bool mesh_is_named(const xml_element *element, const char *name)
+static bool asset_is_named(const xml_element *element, const char *name)
 {
   const char *own = xml_get(element, "name");
   const char *file = xml_get(element, "file");
@@ -28,12 +28,12 @@ static bool mesh_is_named(const xml_element *element, const char *name)
   return strlen(name) == length && memcmp(base, name, length) == 0;
 }
 
-static const xml_element *mesh_find(const mjcf *m, const char *name)
+const xml_element *mjcf_asset(const mjcf *m, const char *kind, const char *name)
 {
   for (const xml_element *top = m->root->children; top != NULL; top = top->next) {
     for (const xml_element *e = xml_is(top, "asset") ? top->children : NULL; e != NULL;
          e = e->next) {
-      if (xml_is(e, "mesh") && mesh_is_named(e, name)) {
+      if (xml_is(e, kind) && asset_is_named(e, name)) {
         return e;
       }
     }
@@ -41,9 +41,8 @@ static const xml_element *mesh_find(const mjcf *m, const char *name)
   return NULL;
 }
 
-/* The numbers of an attribute of any length; NULL where it has none or memory ends. */
-static hap_status list_read(mjcf *m, const xml_element *element, const char *name, double **out,
-                            size_t *out_count)
+hap_status mjcf_list(mjcf *m, const xml_element *element, const char *name, double **out,
+                     size_t *out_count)
 {
   const char *text = xml_get(element, name);
   size_t most = text != NULL ? strlen(text) / 2 + 1 : 0;
@@ -60,8 +59,8 @@ static hap_status inline_read(mjcf *m, const xml_element *element, import_mesh *
   double *faces;
   size_t numbers;
   size_t corners;
-  HAPI_TRY(list_read(m, element, "vertex", &points, &numbers));
-  HAPI_TRY(list_read(m, element, "face", &faces, &corners));
+  HAPI_TRY(mjcf_list(m, element, "vertex", &points, &numbers));
+  HAPI_TRY(mjcf_list(m, element, "face", &faces, &corners));
   import_mesh *mesh = import_take(m->work, sizeof *mesh);
   uint32_t *list = import_take(m->work, (corners + 1) * sizeof *list);
   if (mesh == NULL || list == NULL) {
@@ -115,6 +114,26 @@ static hap_status vertices_place(mjcf *m, const mjcf_item *item, import_mesh *me
   return HAP_OK;
 }
 
+static hap_status mass_find(mjcf *m, const mjcf_item *item, const import_mesh *mesh, mjcf_mesh *out)
+{
+  enum {
+    INERTIA_LEGACY,
+    INERTIA_EXACT,
+    INERTIA_SHELL,
+    INERTIA_CONVEX
+  };
+  int inertia = INERTIA_LEGACY;
+  HAPI_TRY(mjcf_word(m, item, "inertia", "legacy exact shell convex", &inertia));
+  const bool of_hull = inertia == INERTIA_CONVEX || mesh->triangle_count == 0;
+  import_mesh_mass(of_hull ? out->hull : mesh,
+                   inertia == INERTIA_CONVEX ? IMPORT_FILLED : (import_filling)inertia, 1.0,
+                   &out->mass);
+  if (!(out->mass.mass > 0.0)) {
+    import_note(m->work, item->element->at, "mesh: mass left out, its triangles enclose none");
+  }
+  return HAP_OK;
+}
+
 static hap_status mesh_read(mjcf *m, const xml_element *element, mjcf_mesh *out)
 {
   mjcf_item item;
@@ -134,14 +153,13 @@ static hap_status mesh_read(mjcf *m, const xml_element *element, mjcf_mesh *out)
     import_note(m->work, element->at, "mesh left out: %s", why);
     return HAP_OK;
   }
-  import_mesh_mass(mesh->triangle_count > 0 ? mesh : out->hull, 1.0, &out->mass);
-  return HAP_OK;
+  return mass_find(m, &item, mesh, out);
 }
 
 hap_status mjcf_find_mesh(mjcf *m, const mjcf_item *geom, const mjcf_mesh **out)
 {
   const char *name = mjcf_get(m, geom, "mesh");
-  const xml_element *element = name != NULL ? mesh_find(m, name) : NULL;
+  const xml_element *element = name != NULL ? mjcf_asset(m, "mesh", name) : NULL;
   if (element == NULL) {
     return import_refuse(m->work, geom->element->at, "mesh: there is none named %.60s",
                          name != NULL ? name : "nothing");

@@ -19,6 +19,8 @@ typedef struct mjcf_known {
 static const mjcf_known elements[] = {
     {"body", "name childclass " PLACE, "user"},
     {"frame", "name childclass " PLACE, ""},
+    {"replicate", "count offset euler sep childclass", ""},
+    {"hfield", "name file size nrow ncol elevation", "content_type"},
     {"inertial", "pos quat axisangle xyaxes zaxis euler mass diaginertia fullinertia", ""},
     {"geom",
      "name class type contype conaffinity size material rgba friction mass density hfield mesh "
@@ -29,7 +31,7 @@ static const mjcf_known elements[] = {
      "springref damping springdamper",
      "group user solreffriction solimpfriction solreflimit solimplimit margin "
      "actuatorfrcrange actuatorfrclimited actuatorgravcomp"},
-    {"mesh", "name class file vertex face scale refpos refquat",
+    {"mesh", "name class file vertex face scale refpos refquat inertia",
      "normal texcoord smoothnormal maxhullvert content_type material"},
     {"freejoint", "name", "group align"},
     {"compiler",

@@ -119,6 +119,7 @@ void import_shape_mass(import_shape shape, const double size[3], double density,
     }
     case IMPORT_PLANE:
     case IMPORT_MESH:
+    case IMPORT_FIELD:
       break;
   }
   *out = (import_mass){.mass = m, .inertia = {d[0], 0.0, 0.0, 0.0, d[1], 0.0, 0.0, 0.0, d[2]}};
@@ -141,6 +142,9 @@ void import_model_settle(import_model *model)
 
 void import_model_join(import_model *model)
 {
+  for (import_body *body = model->bodies; body != NULL; body = body->next) {
+    body->whole = (import_mass){.mass = 0.0};
+  }
   for (import_body *body = model->bodies; body != NULL; body = body->next) {
     hap_pose inside;
     import_mass placed;

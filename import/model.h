@@ -19,7 +19,8 @@ typedef enum import_shape {
   IMPORT_CYLINDER,  /* radius; half of the length, along z */
   IMPORT_BOX,       /* half edges */
   IMPORT_ELLIPSOID, /* half axes */
-  IMPORT_MESH
+  IMPORT_MESH,
+  IMPORT_FIELD /* half edges along x and y; of what never moves */
 } import_shape;
 
 /* A closed convex surface, triangles counter-clockwise as seen from outside. */
@@ -29,6 +30,13 @@ typedef struct import_mesh {
   size_t vertex_count;
   size_t triangle_count;
 } import_mesh;
+
+/* Heights over x and y, m: rows along y, columns along x, both from the lower end. */
+typedef struct import_field {
+  double *heights;
+  uint32_t columns;
+  uint32_t rows;
+} import_field;
 
 /* About the centre of mass, in the axes of the frame it is told in. */
 typedef struct import_mass {
@@ -44,6 +52,7 @@ typedef struct import_geom {
   hap_pose pose; /* in its body */
   double size[3];
   const import_mesh *mesh;
+  const import_field *field;
   import_mass mass; /* in its body's frame; mass 0: it counts for none */
   bool collides;
   double friction;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/log.h"
+#include "base/number.h"
 #include "base/vec.h"
 #include "import/mesh.h"
 #include "import/mesh_file.h"
@@ -13,7 +14,8 @@
 
 #define LINKS_MOST 5000u
 #define DEPTH_MOST 500u
-#define DENSITY 1000.0 /* kg/m^3, of links without <inertial>, as MuJoCo has it */
+#define NUMBER_MOST 1e12 /* as xml_numbers */
+#define DENSITY 1000.0   /* kg/m^3, of links without <inertial>, as MuJoCo has it */
 
 typedef struct urdf {
   import_work *work;
@@ -51,6 +53,19 @@ static hap_status value_read(urdf *u, const xml_element *of, const char *child, 
   return element != NULL ? xml_numbers(u->work, element, name, XML_OF(1, 1), io, &count) : HAP_OK;
 }
 
+/* Beyond all numbers that may be: there is none. */
+static hap_status stop_read(urdf *u, const xml_element *of, const char *name, double *io)
+{
+  const xml_element *limit = xml_child(of, "limit");
+  const char *text = limit != NULL ? xml_get(limit, name) : NULL;
+  double value;
+  if (text != NULL && hapi_number_read(text, &value) != NULL && fabs(value) > NUMBER_MOST) {
+    *io = copysign(INFINITY, value);
+    return HAP_OK;
+  }
+  return value_read(u, of, "limit", name, io);
+}
+
 static hap_status inertial_read(urdf *u, const xml_element *link, import_body *body)
 {
   static const char *const names[6] = {"ixx", "iyy", "izz", "ixy", "ixz", "iyz"};
@@ -66,8 +81,8 @@ static hap_status inertial_read(urdf *u, const xml_element *link, import_body *b
   for (int k = 0; k < 6; ++k) {
     HAPI_TRY(value_read(u, inertial, "inertia", names[k], &i[k]));
   }
-  if (!(own.mass >= 0.0) || !(i[0] >= 0.0 && i[1] >= 0.0 && i[2] >= 0.0)) {
-    return import_refuse(u->work, inertial->at, "inertial: below 0");
+  if (!(own.mass >= 0.0)) {
+    return import_refuse(u->work, inertial->at, "inertial: mass below 0");
   }
   const double m[9] = {i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2]};
   memcpy(own.inertia, m, sizeof m);
@@ -102,12 +117,14 @@ static const import_mesh *mesh_read(urdf *u, const xml_element *element, import_
   const import_mesh *hull =
       mesh->vertex_count > 3 ? import_hull(u->work, scaled, mesh->vertex_count, out_why) : NULL;
   if (hull != NULL) {
-    import_mesh_mass(mesh->triangle_count > 0 ? mesh : hull, DENSITY, out_mass);
+    import_mesh_mass(mesh->triangle_count > 0 ? mesh : hull, IMPORT_FILLED_TWICE, DENSITY,
+                     out_mass);
   }
   return hull;
 }
 
-static hap_status lengths_read(urdf *u, const xml_element *shape, import_geom *geom)
+/* *out_good: all are above 0. */
+static hap_status lengths_read(urdf *u, const xml_element *shape, import_geom *geom, bool *out_good)
 {
   size_t count = 0;
   bool good = true;
@@ -126,10 +143,8 @@ static hap_status lengths_read(urdf *u, const xml_element *shape, import_geom *g
     geom->size[1] *= 0.5;
     good = geom->size[1] > 0.0;
   }
-  return good && geom->size[0] > 0.0
-             ? HAP_OK
-             : import_refuse(u->work, shape->at, "%.40s: a length that is not above 0",
-                             shape->name);
+  *out_good = good && geom->size[0] > 0.0;
+  return HAP_OK;
 }
 
 static hap_status collision_read(urdf *u, const xml_element *collision, import_body *body,
@@ -147,9 +162,12 @@ static hap_status collision_read(urdf *u, const xml_element *collision, import_b
     geom->shape = IMPORT_MESH;
     geom->mesh = mesh_read(u, shape, &own, &why);
   } else if (shape != NULL && xml_word_in(shape->name, "box sphere cylinder capsule")) {
-    HAPI_TRY(lengths_read(u, shape, geom));
-    import_shape_mass(geom->shape, geom->size, DENSITY, &own);
-    why = NULL;
+    bool good;
+    HAPI_TRY(lengths_read(u, shape, geom, &good));
+    why = good ? NULL : "a length that is not above 0";
+    if (good) {
+      import_shape_mass(geom->shape, geom->size, DENSITY, &own);
+    }
   }
   if (why != NULL && geom->mesh == NULL) {
     import_note(u->work, collision->at, "collision of link %.60s left out: %s", body->name, why);
@@ -217,12 +235,13 @@ static hap_status joint_read(urdf *u, const xml_element *element, import_body *b
   hapi_v3_scale(1.0 / length, axis, joint->axis);
   if (strcmp(type, "continuous") != 0 && !is_free) {
     joint->low = joint->high = 0.0;
-    HAPI_TRY(value_read(u, element, "limit", "lower", &joint->low));
-    HAPI_TRY(value_read(u, element, "limit", "upper", &joint->high));
+    HAPI_TRY(stop_read(u, element, "lower", &joint->low));
+    HAPI_TRY(stop_read(u, element, "upper", &joint->high));
     if (joint->low > joint->high) {
-      return import_refuse(u->work, element->at, "limit: does not rise");
+      import_note(u->work, element->at, "joint %.60s: limit that does not rise left out",
+                  joint->name);
     }
-    if (joint->low == 0.0 && joint->high == 0.0) { /* as good as not said */
+    if (joint->low > joint->high || (joint->low == 0.0 && joint->high == 0.0)) { /* not said */
       joint->low = -INFINITY;
       joint->high = INFINITY;
     }

@@ -10,15 +10,10 @@
 #include <stdio.h>
 #include <string.h>
 
-#ifdef HAPODE_ORACLE
-#include <mujoco/mujoco.h>
-#endif
-
 #include "base/vec.h"
 #include "import/import.h"
 #include "tests/program.h"
-
-#define NEAR 1e-6
+#include "tests/scene_oracle.h"
 
 SET_UP
 {
@@ -157,140 +152,16 @@ static import_model file_read(import_work *work, const char *text)
   return model;
 }
 
-#ifdef HAPODE_ORACLE
-
-static void vectors_check(const char *what, const char *of, const double *ours,
-                          const mjtNum *theirs, int count)
+/* Mass, centre, inertia, axis, range, pose and the like equal MuJoCo's. */
+static void oracle_check(const char *path, const import_model *ours)
 {
-  for (int k = 0; k < count; ++k) {
-    CHECK_SAY(fabs(ours[k] - theirs[k]) < NEAR, "%s of \"%s\": number %d is %.9g and not %.9g",
-              what, of, k, ours[k], theirs[k]);
+  oracle_found found;
+  if (!scene_oracle_is_there()) {
+    SKIP("MuJoCo is not there to compare with (Debian: libmujoco-dev)");
   }
+  REQUIRE_SAY(scene_oracle(path, ours, &found), "MuJoCo: %s", found.first);
+  CHECK_SAY(found.differ == 0, "%zu differ: %s", found.differ, found.first);
 }
-
-/* Of two signs the one that fits. */
-static void turn_check(const char *what, const char *of, const double *ours, const mjtNum *theirs)
-{
-  double dot = 0.0;
-  double flipped[4];
-  for (int k = 0; k < 4; ++k) {
-    dot += ours[k] * theirs[k];
-  }
-  for (int k = 0; k < 4; ++k) {
-    flipped[k] = dot < 0.0 ? -ours[k] : ours[k];
-  }
-  vectors_check(what, of, flipped, theirs, 4);
-}
-
-static void mass_check(const import_body *body, const mjModel *theirs, int i)
-{
-  mjtNum r[9];
-  double inertia[9];
-  const mjtNum *d = theirs->body_inertia + 3 * i;
-  const double diagonal[9] = {d[0], 0, 0, 0, d[1], 0, 0, 0, d[2]};
-  mju_quat2Mat(r, theirs->body_iquat + 4 * i);
-  hapi_m3_turn(r, diagonal, inertia);
-  vectors_check("mass", body->name, &body->mass.mass, theirs->body_mass + i, 1);
-  if (body->mass.mass > 0.0) {
-    vectors_check("centre", body->name, body->mass.centre, theirs->body_ipos + 3 * i, 3);
-    vectors_check("inertia", body->name, body->mass.inertia, inertia, 9);
-  }
-}
-
-static void joint_check(const import_joint *joint, const mjModel *theirs, int j)
-{
-  static const int kinds[] = {mjJNT_FREE, mjJNT_BALL, mjJNT_HINGE, mjJNT_SLIDE};
-  CHECK_SAY(kinds[joint->kind] == theirs->jnt_type[j], "kind of joint \"%s\"", joint->name);
-  if (joint->kind == IMPORT_FREE) {
-    return;
-  }
-  vectors_check("anchor", joint->name, joint->anchor, theirs->jnt_pos + 3 * j, 3);
-  if (joint->kind != IMPORT_BALL) {
-    vectors_check("axis", joint->name, joint->axis, theirs->jnt_axis + 3 * j, 3);
-    mjtNum zero = theirs->qpos0[theirs->jnt_qposadr[j]];
-    const double range[2] = {joint->low + zero, joint->high + zero};
-    bool limited = theirs->jnt_limited[j] != 0;
-    CHECK_SAY(limited == (isfinite(joint->low) != 0), "limits of joint \"%s\"", joint->name);
-    if (limited) {
-      vectors_check("range", joint->name, range, theirs->jnt_range + 2 * j, 2);
-    }
-  }
-  vectors_check("armature", joint->name, &joint->armature,
-                theirs->dof_armature + theirs->jnt_dofadr[j], 1);
-  vectors_check("friction", joint->name, &joint->friction,
-                theirs->dof_frictionloss + theirs->jnt_dofadr[j], 1);
-}
-
-static void geom_check(const import_geom *geom, const mjModel *theirs, int g)
-{
-  static const int types[] = {mjGEOM_PLANE, mjGEOM_SPHERE,    mjGEOM_CAPSULE, mjGEOM_CYLINDER,
-                              mjGEOM_BOX,   mjGEOM_ELLIPSOID, mjGEOM_MESH};
-  static const int sizes[] = {0, 1, 2, 2, 3, 3, 0};
-  CHECK_SAY(types[geom->shape] == theirs->geom_type[g], "shape of geom \"%s\"", geom->name);
-  if (geom->shape != IMPORT_MESH) { /* its frame is put into the centre of mass */
-    vectors_check("place of geom", geom->name, geom->pose.position, theirs->geom_pos + 3 * g, 3);
-    turn_check("turn of geom", geom->name, geom->pose.quat_wxyz, theirs->geom_quat + 4 * g);
-  }
-  vectors_check("size", geom->name, geom->size, theirs->geom_size + 3 * g, sizes[geom->shape]);
-  vectors_check("friction of geom", geom->name, &geom->friction, theirs->geom_friction + 3 * g, 1);
-  CHECK(geom->category_bits == (uint32_t)theirs->geom_contype[g]);
-  CHECK(geom->collide_bits == (uint32_t)theirs->geom_conaffinity[g]);
-  for (int k = 0; k < 4; ++k) {
-    const int material = theirs->geom_matid[g];
-    const float *rgba = material < 0 ? theirs->geom_rgba + 4 * (ptrdiff_t)g
-                                     : theirs->mat_rgba + 4 * (ptrdiff_t)material;
-    CHECK(fabsf(geom->colour_rgba[k] - rgba[k]) < 1e-6F);
-  }
-}
-
-static void model_check(const import_model *ours, const mjModel *theirs, const mjData *data,
-                        bool with_geoms)
-{
-  int i = 0;
-  int j = 0;
-  int g = 0;
-  vectors_check("gravity", ours->name, ours->gravity, theirs->opt.gravity, 3);
-  for (const import_body *body = ours->bodies; body != NULL; body = body->next, ++i) {
-    REQUIRE(i < theirs->nbody);
-    vectors_check("place", body->name, body->pose_world.position, data->xpos + 3 * i, 3);
-    turn_check("turn", body->name, body->pose_world.quat_wxyz, data->xquat + 4 * i);
-    if (i > 0) {
-      mass_check(body, theirs, i);
-    }
-    for (const import_joint *joint = body->joints; joint != NULL; joint = joint->next, ++j) {
-      REQUIRE(j < theirs->njnt);
-      joint_check(joint, theirs, j);
-    }
-    for (const import_geom *geom = body->geoms; geom != NULL && with_geoms;
-         geom = geom->next, ++g) {
-      REQUIRE(g < theirs->ngeom);
-      geom_check(geom, theirs, g);
-    }
-  }
-  CHECK(i == theirs->nbody && j == theirs->njnt && (!with_geoms || g == theirs->ngeom));
-}
-
-static void oracle_check(const char *path, const import_model *ours, bool with_geoms)
-{
-  char error[300] = "";
-  mjModel *theirs = mj_loadXML(path, NULL, error, sizeof error);
-  REQUIRE_SAY(theirs != NULL, "MuJoCo: %s", error);
-  mjData *data = mj_makeData(theirs);
-  mj_kinematics(theirs, data);
-  model_check(ours, theirs, data, with_geoms);
-  mj_deleteData(data);
-  mj_deleteModel(theirs);
-}
-
-#else
-
-static void oracle_check(const char *path, const import_model *ours, bool with_geoms)
-{
-  (void)path, (void)ours, (void)with_geoms;
-  SKIP("MuJoCo is not there to compare with (Debian: libmujoco-dev)");
-}
-
-#endif
 
 TEST_EACH(mjcf_cases, const file_case *row)
 {
@@ -298,7 +169,7 @@ TEST_EACH(mjcf_cases, const file_case *row)
   import_work work = {.said = note_take, .user = &notes};
   import_model model = file_read(&work, row->text);
   CHECK_SAY(notes.length == 0, "%s", notes.lines);
-  oracle_check(folder_path("scene.xml"), &model, true);
+  oracle_check(folder_path("scene.xml"), &model);
   import_work_finish(&work);
 }
 
@@ -334,54 +205,13 @@ static const file_case urdf_cases[] = {
           "<joint name='b' type='continuous'><parent link='arm'/><child link='hand'/></joint>")},
 };
 
-#ifdef HAPODE_ORACLE
-
-/* By the names of links: the order is MuJoCo's own. */
-static void urdf_check(const char *path, const import_model *ours)
-{
-  char error[300] = "";
-  mjModel *theirs = mj_loadXML(path, NULL, error, sizeof error);
-  REQUIRE_SAY(theirs != NULL, "MuJoCo: %s", error);
-  mjData *data = mj_makeData(theirs);
-  int count = 1;
-  mj_kinematics(theirs, data);
-  for (const import_body *body = ours->bodies->next; body != NULL; body = body->next, ++count) {
-    int i = mj_name2id(theirs, mjOBJ_BODY, body->name);
-    REQUIRE_SAY(i > 0, "no body \"%s\"", body->name);
-    vectors_check("place", body->name, body->pose_world.position, data->xpos + 3 * i, 3);
-    turn_check("turn", body->name, body->pose_world.quat_wxyz, data->xquat + 4 * i);
-    mass_check(body, theirs, i);
-    CHECK(theirs->body_jntnum[i] == (body->joints != NULL ? 1 : 0));
-    if (body->joints != NULL) {
-      joint_check(body->joints, theirs, theirs->body_jntadr[i]);
-    }
-    int g = theirs->body_geomadr[i];
-    for (const import_geom *geom = body->geoms; geom != NULL; geom = geom->next, ++g) {
-      vectors_check("place of geom", body->name, geom->pose.position, theirs->geom_pos + 3 * g, 3);
-      turn_check("turn of geom", body->name, geom->pose.quat_wxyz, theirs->geom_quat + 4 * g);
-    }
-  }
-  CHECK(count == theirs->nbody);
-  mj_deleteData(data);
-  mj_deleteModel(theirs);
-}
-
-#else
-
-static void urdf_check(const char *path, const import_model *ours)
-{
-  oracle_check(path, ours, true); /* skips */
-}
-
-#endif
-
 TEST_EACH(urdf_cases, const file_case *row)
 {
   noted notes = {.length = 0};
   import_work work = {.said = note_take, .user = &notes};
   import_model model = file_read(&work, row->text);
   CHECK_SAY(strcmp(notes.lines, "scene.xml:2: mujoco left out\n") == 0, "%s", notes.lines);
-  urdf_check(folder_path("scene.xml"), &model);
+  oracle_check(folder_path("scene.xml"), &model);
   import_work_finish(&work);
 }
 
@@ -409,7 +239,7 @@ TEST(a_humanoid)
   REQUIRE_SAY(import_read(&work, path, &model) == HAP_OK, "%s", why.text);
   CHECK(strstr(notes.lines, "humanoid.xml:67: joint: damping left out\n") != NULL);
   CHECK(strstr(notes.lines, "tendon left out, 2 in it\n") != NULL);
-  oracle_check(path, &model, true);
+  oracle_check(path, &model);
   import_work_finish(&work);
 }
 
@@ -645,7 +475,7 @@ TEST(files_are_included)
                 "</mujoco>");
   CHECK_SAY(strcmp(notes.lines, "part.xml:2: joint: damping left out\n") == 0, "%s", notes.lines);
   work.said = NULL;
-  oracle_check(folder_path("scene.xml"), &model, true);
+  oracle_check(folder_path("scene.xml"), &model);
   import_work_finish(&work);
   file_write(folder_path("head.xml"), "<mujoco>\n<include file='head.xml'/></mujoco>");
   hap_scene *scene = NULL;

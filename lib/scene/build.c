@@ -112,15 +112,14 @@ static void geoms_drop(hap_scene *scene, uint32_t count)
 static void mass_given(const hap_body_def *def, dMass *out)
 {
   const double(*m)[3] = def->inertia;
-  const double *c = def->centre;
   dMassSetParameters(out, def->mass, 0.0, 0.0, 0.0, m[0][0], m[1][1], m[2][2], m[0][1], m[0][2],
                      m[1][2]);
-  dMassTranslate(out, c[0], c[1], c[2]); /* as geoms have it: about the frame's origin */
 }
 
-/* Behind those that have numbers, and their mass. geoms: NULL where there are none. */
+/* Behind those that have numbers, and their mass about its centre. geoms: NULL where there are
+ * none. */
 static hap_status geoms_make(hap_scene *scene, const hap_body_def *def, const hap_geom_def *geoms,
-                             dMass *out, hap_detail *detail)
+                             dMass *out, double out_centre[3], hap_detail *detail)
 {
   dMassSetZero(out);
   for (uint32_t i = 0; geoms != NULL && i < def->geom_count; ++i) {
@@ -142,26 +141,29 @@ static hap_status geoms_make(hap_scene *scene, const hap_body_def *def, const ha
     }
     dMassAdd(out, &mass);
   }
-  if (def->has_inertia != 0) {
+  if (def->has_inertia !=
+      0) { /* never moved to the origin and back: a small one would not stand it */
     mass_given(def, out);
-  } else if (def->mass > 0.0) {
+    memcpy(out_centre, def->centre, sizeof def->centre);
+    return HAP_OK;
+  }
+  if (def->mass > 0.0) {
     dMassAdjust(out, def->mass);
   }
+  memcpy(out_centre, out->c, 3 * sizeof *out_centre);
+  dMassTranslate(out, -out_centre[0], -out_centre[1], -out_centre[2]);
+  memset(out->c, 0, sizeof out->c);
   return HAP_OK;
 }
 
-static void body_make(hap_scene *scene, const hap_body_def *def, const dMass *whole)
+static void body_make(hap_scene *scene, const hap_body_def *def, const dMass *mass)
 {
   hapi_scene_body *out = &scene->bodies[scene->body_count];
-  dMass mass = *whole;
   double at[3];
   double across[3];
   double v[3];
-  memcpy(out->centre, whole->c, sizeof out->centre);
-  dMassTranslate(&mass, -whole->c[0], -whole->c[1], -whole->c[2]);
-  memset(mass.c, 0, sizeof mass.c);
   out->body = dBodyCreate(scene->world);
-  dBodySetMass(out->body, &mass);
+  dBodySetMass(out->body, mass);
   hapi_pose_point(def->pose.position, def->pose.quat_wxyz, out->centre, at);
   dBodySetPosition(out->body, at[0], at[1], at[2]);
   dBodySetQuaternion(out->body, def->pose.quat_wxyz);
@@ -211,14 +213,12 @@ static hap_status geoms_read(const hap_body_def *def, hap_geom_def *out, hap_det
   return HAP_OK;
 }
 
-/* By its leading minors, of the smallest size that counts. */
+/* As ODE sees it, which ends the process otherwise. */
 static bool matrix_positive(const double m[3][3])
 {
-  const double minor = m[0][0] * m[1][1] - m[0][1] * m[1][0];
-  const double all = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-                     m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-                     m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-  return m[0][0] > 0.0 && minor > 0.0 && all > 0.0;
+  const dReal rows[12] = {m[0][0], m[0][1], m[0][2], 0.0,     m[1][0], m[1][1],
+                          m[1][2], 0.0,     m[2][0], m[2][1], m[2][2], 0.0};
+  return dIsPositiveDefinite(rows, 3) != 0;
 }
 
 /* NULL: a body can have it. Principal moments are those of sum * 1 - 2 * m as well, none of which
@@ -281,11 +281,13 @@ static hap_status body_add(hap_scene *scene, const hap_body_def *def, const hap_
                     sizeof *scene->bodies)) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a body");
   }
-  HAPI_TRY(geoms_make(scene, def, geoms, &mass, detail));
+  HAPI_TRY(geoms_make(scene, def, geoms, &mass, scene->bodies[scene->body_count].centre, detail));
   body_make(scene, def, &mass);
   geoms_attach(scene, count);
   ++scene->body_count;
-  return HAP_OK;
+  return count == 0 && scene->session != NULL
+             ? hap_session_adopt_body(scene->session, scene->bodies[scene->body_count - 1].body)
+             : HAP_OK;
 }
 
 hap_status hap_scene_add_body(hap_scene *scene, const hap_body_def *given, uint32_t *out_body,

@@ -154,6 +154,18 @@ static void session_gone(void *arg)
   scene->session = NULL;
 }
 
+/* A body without geoms is known by nothing else, unless a joint ties it to one that has some. */
+static hap_status geomless_adopt(const hap_scene *scene, hap_session *session)
+{
+  for (uint32_t i = 0; i < scene->body_count; ++i) {
+    dBodyID body = scene->bodies[i].body;
+    if (body != NULL && dBodyGetFirstGeom(body) == NULL) {
+      HAPI_TRY(hap_session_adopt_body(session, body));
+    }
+  }
+  return HAP_OK;
+}
+
 /* Bodies that were removed have no place. */
 static hap_status first_trace(const hap_scene *scene, hap_session *session)
 {
@@ -184,7 +196,8 @@ hap_status hap_scene_session(hap_scene *scene, const hap_session_def *def, hap_s
   ode.magnet_reach = scene->magnet_reach;
   ode.user = scene;
   HAPI_TRY(hap_session_create(def, &ode, out, detail));
-  hap_status status = first_trace(scene, *out);
+  hap_status status = geomless_adopt(scene, *out);
+  status = status >= HAP_OK ? first_trace(scene, *out) : status;
   if (status < HAP_OK) {
     (void)hap_session_detail(*out, detail);
     hap_session_destroy(*out);

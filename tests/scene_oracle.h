@@ -1,0 +1,23 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_TESTS_SCENE_ORACLE_H
+#define HAPODE_TESTS_SCENE_ORACLE_H
+
+/* What a reader of scene files has found against what MuJoCo's own compiler finds in the same file.
+ * Bodies and joints of MJCF come in the file's order, those of URDF by their names. */
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "import/model.h"
+
+typedef struct oracle_found {
+  size_t differ;   /* numbers that are not equal within 1e-6 */
+  char first[400]; /* the first of them; of a file that MuJoCo refuses its reason */
+} oracle_found;
+
+bool scene_oracle_is_there(void);
+/* False: MuJoCo refuses the file. Meshes of bodies are compared by their mass alone. */
+bool scene_oracle(const char *path, const import_model *ours, oracle_found *out);
+
+#endif
