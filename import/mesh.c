@@ -35,7 +35,7 @@ static const import_mesh *hull_take(import_work *work, qhT *qh, const double *po
   FORALLfacets
   {
     size_t corner = 0;
-    setT *around = qh_facet3vertex(qh, facet); /* counter-clockwise as seen from outside */
+    setT *around = qh_facet3vertex(qh, facet); /* clockwise as seen from outside */
     FOREACHvertex_(around)
     {
       size_t id = (size_t)qh_pointid(qh, vertex->point);
@@ -44,7 +44,7 @@ static const import_mesh *hull_take(import_work *work, qhT *qh, const double *po
         number[id] = (uint32_t)++mesh->vertex_count;
       }
       if (corner < 3) {
-        list[3 * mesh->triangle_count + corner++] = number[id] - 1;
+        list[3 * mesh->triangle_count + 2 - corner++] = number[id] - 1;
       }
     }
     qh_settempfree(qh, &around);

@@ -65,16 +65,35 @@ static hap_status option_read(mjcf *m, const xml_element *element)
   return HAP_OK;
 }
 
-static hap_status exclude_read(mjcf *m, const xml_element *element)
+/* Two bodies that an element names; what is not named stays. *out_there: both are there. Refused:
+ * they are not, unless <replicate> has given its copies other names. */
+static hap_status ends_find(mjcf *m, const xml_element *element, const import_body *io[2],
+                            bool *out_there)
 {
   const char *names[2] = {xml_get(element, "body1"), xml_get(element, "body2")};
-  const import_body *bodies[2];
+  *out_there = true;
   for (int i = 0; i < 2; ++i) {
-    bodies[i] = names[i] != NULL ? import_find_body(m->model, names[i]) : NULL;
-    if (bodies[i] == NULL) {
+    io[i] = names[i] != NULL ? import_find_body(m->model, names[i]) : io[i];
+    if (io[i] == NULL && m->replicas > 0 && names[i] != NULL) {
+      *out_there = false;
+    } else if (io[i] == NULL) {
       return import_refuse(m->work, element->at, "body%d: there is no body %.60s", i + 1,
                            names[i] != NULL ? names[i] : "without a name");
     }
+  }
+  if (!*out_there) {
+    import_note(m->work, element->at, "%.40s between copies left out", element->name);
+  }
+  return HAP_OK;
+}
+
+static hap_status exclude_read(mjcf *m, const xml_element *element)
+{
+  const import_body *bodies[2] = {NULL, NULL};
+  bool there;
+  HAPI_TRY(ends_find(m, element, bodies, &there));
+  if (!there) {
+    return HAP_OK;
   }
   import_pass *pass = import_take(m->work, sizeof *pass);
   if (pass == NULL) {
@@ -96,24 +115,27 @@ static hap_status contact_read(mjcf *m, const xml_element *contact)
 }
 
 /* connect and weld between bodies; all else is noted. */
-static hap_status hold_read(mjcf *m, const xml_element *element, import_hold *hold)
+static hap_status hold_read(mjcf *m, const xml_element *element)
 {
   const mjcf_item item = {element, m->classes};
-  const char *names[2] = {xml_get(element, "body1"), xml_get(element, "body2")};
   const import_body *bodies[2] = {NULL, m->model->bodies};
   size_t count;
-  for (int i = 0; i < 2; ++i) {
-    bodies[i] = names[i] != NULL ? import_find_body(m->model, names[i]) : bodies[i];
-    if (bodies[i] == NULL) {
-      return import_refuse(m->work, element->at, "body%d: there is no body %.60s", i + 1,
-                           names[i] != NULL ? names[i] : "without a name");
-    }
+  bool there;
+  HAPI_TRY(ends_find(m, element, bodies, &there));
+  if (!there) {
+    return HAP_OK;
+  }
+  import_hold *hold = import_take(m->work, sizeof *hold);
+  if (hold == NULL) {
+    return import_no_memory(m->work);
   }
   HAPI_TRY(mjcf_numbers(m, &item, "anchor", XML_OF(3, 3), hold->anchor, &count));
   hold->at = element->at;
   hold->a = bodies[0];
   hold->b = bodies[1];
   hold->is_fixed = xml_is(element, "weld");
+  hold->next = m->model->holds;
+  m->model->holds = hold;
   return HAP_OK;
 }
 
@@ -126,13 +148,7 @@ static hap_status equality_read(mjcf *m, const xml_element *equality)
       import_note(m->work, child->at, "equality: %.40s left out", child->name);
       continue;
     }
-    import_hold *hold = import_take(m->work, sizeof *hold);
-    if (hold == NULL) {
-      return import_no_memory(m->work);
-    }
-    HAPI_TRY(hold_read(m, child, hold));
-    hold->next = m->model->holds;
-    m->model->holds = hold;
+    HAPI_TRY(hold_read(m, child));
   }
   return HAP_OK;
 }

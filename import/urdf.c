@@ -246,6 +246,15 @@ static hap_status joint_read(urdf *u, const xml_element *element, import_body *b
       joint->high = INFINITY;
     }
   }
+  if (strcmp(type, "continuous") == 0) {
+    double ends[2] = {0.0, 0.0};
+    HAPI_TRY(stop_read(u, element, "lower", &ends[0]));
+    HAPI_TRY(stop_read(u, element, "upper", &ends[1]));
+    if (isfinite(ends[0]) && isfinite(ends[1]) && ends[0] < ends[1]) {
+      import_note(u->work, element->at, "joint %.60s: limit of a continuous joint left out",
+                  joint->name);
+    }
+  }
   HAPI_TRY(value_read(u, element, "dynamics", "friction", &joint->friction));
   HAPI_TRY(value_read(u, element, "dynamics", "damping", &joint->damping));
   if (!(joint->friction >= 0.0)) {

@@ -20,4 +20,8 @@ bool scene_oracle_is_there(void);
 /* False: MuJoCo refuses the file. Meshes of bodies are compared by their mass alone. */
 bool scene_oracle(const char *path, const import_model *ours, oracle_found *out);
 
+/* Where a body of MJCF, from 0, has its frame after a time, in MuJoCo's own steps of 0.2 ms. False:
+ * MuJoCo refuses the file, or has no such body. */
+bool scene_oracle_move(const char *path, double seconds, size_t body, double out_position[3]);
+
 #endif
