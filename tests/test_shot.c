@@ -164,6 +164,28 @@ TEST(frames_come_thirty_times_a_second)
   CHECK(!file_exists(path));
 }
 
+/* Of the yellow of touches, on ground that is not. */
+static int yellows_of(const picture *p)
+{
+  int count = 0;
+  for (int i = 0; i < p->width * p->height * 3 / 4; ++i) {
+    const uint8_t *c = &p->pixels[3 * i];
+    count += c[0] > 150 && c[1] > 0.82 * c[0] && c[2] < 0.45 * c[1];
+  }
+  return count;
+}
+
+TEST(a_recording_shows_where_it_was_touched)
+{
+  drawing_require();
+  const char *recording = path_keep("run.rec");
+  const char *path = path_keep("played.png");
+  REQUIRE(run("--scene field --seconds 2 --no-realtime --record %s", recording) == 0);
+  REQUIRE(run("--play %s --shot-size 640x360 --shot %s", recording, path) == 0);
+  picture p = picture_read(path);
+  CHECK_SAY(yellows_of(&p) > 50, "%d", yellows_of(&p));
+}
+
 TEST(a_recording_has_pictures)
 {
   drawing_require();

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/pointer_id.h"
 #include "base/vec.h"
 #include "scene/scene_internal.h"
 #include "tools/run_summary.h"
@@ -76,6 +77,15 @@ static void pointer_from_row(const hap_trace_pointer *from, view_pointer *out)
   memcpy(out->force, from->force, sizeof from->force);
 }
 
+/* A replay has the pointers of its recording, and nobody was told their names: of the first
+ * generation, as a run that is not edited has them. v 0: it is not there. */
+static hap_pointer_id pointer_replayed(hap_session *session, size_t index)
+{
+  const hap_pointer_id id = {hapi_pointer_id_of(1, (uint32_t)index + 1)};
+  hap_pointer_state state;
+  return hap_pointer_get(session, id, &state, sizeof state) >= HAP_OK ? id : (hap_pointer_id){0};
+}
+
 /* The device is as far from the pointer as the newest drawn poses have it. */
 static void pointer_read(hap_session *session, hap_pointer_id id, view_pointer *out)
 {
@@ -133,9 +143,11 @@ void run_frame_read(const run_frame_source *from, double t, view_frame *io)
   bodies_read(from, io);
   io->pointer_count = from->pointers;
   for (size_t i = 0; i < from->pointers; ++i) {
-    if (r->pointer_count > 0) {
-      pointer_read(r->session, r->pointers[i], &io->pointers[i]);
-      touches_read(r->session, r->pointers[i], io);
+    const hap_pointer_id id =
+        r->pointer_count > 0 ? r->pointers[i] : pointer_replayed(r->session, i);
+    if (id.v != 0) {
+      pointer_read(r->session, id, &io->pointers[i]);
+      touches_read(r->session, id, io);
     } else {
       pointer_from_row(&from->row.pointers[i], &io->pointers[i]);
     }
