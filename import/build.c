@@ -174,15 +174,6 @@ static void inertia_mend(import_work *work, import_body *body)
               body->name, m[0], some ? "about all axes" : "of a ball of its mass");
 }
 
-static size_t joints_count(const import_body *body)
-{
-  size_t count = 0;
-  for (const import_joint *joint = body->joints; joint != NULL; joint = joint->next) {
-    ++count;
-  }
-  return count;
-}
-
 static hap_status part_add(import_work *work, import_body *body, const hap_body_def *def,
                            hap_scene *scene, uint32_t *out)
 {
@@ -194,33 +185,62 @@ static hap_status part_add(import_work *work, import_body *body, const hap_body_
 /* ---- joints ---- */
 
 /* ODE's hinges turn less than half a turn to a stop. */
-static void limits_fill(import_work *work, const import_joint *joint, hap_joint_def *out)
+static void limits_fill(import_work *work, const import_joint *joint, int axis, hap_joint_def *out)
 {
   const double most = joint->kind == IMPORT_SLIDER ? INFINITY : M_PI;
-  out->low[0] = joint->low >= -most ? joint->low : -INFINITY;
-  out->high[0] = joint->high <= most ? joint->high : INFINITY;
-  if ((out->low[0] != joint->low || out->high[0] != joint->high)) {
+  out->low[axis] = joint->low >= -most ? joint->low : -INFINITY;
+  out->high[axis] = joint->high <= most ? joint->high : INFINITY;
+  if ((out->low[axis] != joint->low || out->high[axis] != joint->high)) {
     import_note(work, joint->at, "joint %.60s: limits beyond half a turn left out", joint->name);
   }
 }
 
 /* Spring, damper and rotor of a hinge or slider; a word of what another joint has of it. */
-static void spring_fill(import_work *work, const import_joint *joint, hap_joint_def *out)
+static void spring_fill(import_work *work, const import_joint *joint, int axis, hap_joint_def *out)
 {
   const bool has_axis = joint->kind == IMPORT_HINGE || joint->kind == IMPORT_SLIDER;
   const double values[] = {joint->stiffness, joint->damping, joint->armature};
   static const char *const names[] = {"stiffness", "damping", "armature"};
-  double *const to[] = {&out->stiffness, &out->damping, &out->inertia};
-  out->rest = joint->rest;
+  double *const to[] = {out->stiffness, out->damping, out->inertia};
+  out->rest[axis] = joint->rest;
   for (int i = 0; i < 3; ++i) {
     if (has_axis && values[i] >= 0.0 && values[i] <= 1e9) {
-      *to[i] = values[i];
+      to[i][axis] = values[i];
     } else if (values[i] != 0.0) {
       import_note(work, joint->at, "joint %.60s: %s left out", joint->name, names[i]);
     }
   }
 }
 
+/* Two hinges one after the other at one point and at right angles are a universal joint, without a
+ * body between them. */
+static bool joints_pair(const import_joint *first)
+{
+  const import_joint *second = first->next;
+  double apart[3];
+  if (second == NULL || first->kind != IMPORT_HINGE || second->kind != IMPORT_HINGE) {
+    return false;
+  }
+  hapi_v3_sub(first->anchor, second->anchor, apart);
+  return hapi_v3_norm(apart) < 1e-9 && fabs(hapi_v3_dot(first->axis, second->axis)) < 1e-6;
+}
+
+/* The part of the body that comes with one joint, or two of them. */
+static const import_joint *joints_after(const import_joint *joint)
+{
+  return joints_pair(joint) ? joint->next->next : joint->next;
+}
+
+static size_t parts_count(const import_body *body)
+{
+  size_t count = 0;
+  for (const import_joint *joint = body->joints; joint != NULL; joint = joints_after(joint)) {
+    ++count;
+  }
+  return count;
+}
+
+/* Of a pair the second axis goes with the body that is moved, the first with the one before it. */
 static hap_status joint_add(import_work *work, const import_body *body, const import_joint *joint,
                             const uint32_t ends[2], hap_scene *scene)
 {
@@ -229,21 +249,25 @@ static hap_status joint_add(import_work *work, const import_body *body, const im
                                          [IMPORT_HINGE] = HAP_JOINT_HINGE,
                                          [IMPORT_SLIDER] = HAP_JOINT_SLIDER};
   const hap_pose *frame = &body->pose_world;
+  const bool pair = joints_pair(joint);
+  const import_joint *of[2] = {pair ? joint->next : joint, joint};
   hap_joint_def def;
   hap_detail why = {""};
   hap_joint_def_init(&def, sizeof def);
-  def.kind = kinds[joint->kind];
+  def.kind = pair ? HAP_JOINT_UNIVERSAL : kinds[joint->kind];
   def.body_a = ends[0];
   def.body_b = ends[1];
   hapi_pose_point(frame->position, frame->quat_wxyz, joint->anchor, def.anchor);
-  hapi_quat_rotate(frame->quat_wxyz, joint->axis, def.axis[0]);
-  if (joint->kind != IMPORT_BALL) {
-    limits_fill(work, joint, &def);
-    def.motor_force[0] = joint->friction;
-  } else if (joint->friction > 0.0) {
-    import_note(work, joint->at, "joint %.60s: friction of a ball joint left out", joint->name);
+  for (int axis = 0; axis < (pair ? 2 : 1); ++axis) {
+    hapi_quat_rotate(frame->quat_wxyz, of[axis]->axis, def.axis[axis]);
+    spring_fill(work, of[axis], axis, &def);
+    if (joint->kind != IMPORT_BALL) {
+      limits_fill(work, of[axis], axis, &def);
+      def.motor_force[axis] = of[axis]->friction;
+    } else if (joint->friction > 0.0) {
+      import_note(work, joint->at, "joint %.60s: friction of a ball joint left out", joint->name);
+    }
   }
-  spring_fill(work, joint, &def);
   hap_status status = hap_scene_add_joint(scene, &def, NULL, &why);
   return status < HAP_OK ? build_fail(work, joint->at, status, &why) : HAP_OK;
 }
@@ -262,13 +286,14 @@ static bool body_is_nothing(const import_model *model, const import_body *body)
   return !needed;
 }
 
-/* The body with its joints. The first joint stands on the parent, each further one on the body that
- * the joint before it moves. */
+/* The body with its joints. The first joint or pair of them stands on the parent, each further one
+ * on the body that the one before it moves. */
 static hap_status carrier_add(import_work *work, const import_model *model, import_body *body,
                               hap_scene *scene)
 {
   hap_body_def def;
-  const size_t joints = joints_count(body);
+  const size_t parts = parts_count(body);
+  const double share = fmin(BETWEEN_SHARE, 0.5 / (double)parts);
   const import_body *parent = body->parent->carrier;
   const uint32_t parent_number = parent->parent == NULL ? HAP_SCENE_WORLD : parent->number;
   uint32_t below = parent_number;
@@ -285,14 +310,14 @@ static hap_status carrier_add(import_work *work, const import_model *model, impo
   hap_body_def_init(&def, sizeof def);
   def.pose = body->pose_world;
   const import_joint *joint = body->joints;
-  mass_fill(&body->whole, BETWEEN_SHARE, &def);
-  for (; joint->next != NULL; joint = joint->next) {
+  mass_fill(&body->whole, share, &def);
+  for (; joints_after(joint) != NULL; joint = joints_after(joint)) {
     uint32_t between;
     HAPI_TRY(part_add(work, body, &def, scene, &between));
     HAPI_TRY(joint_add(work, body, joint, (const uint32_t[2]){between, below}, scene));
     below = between;
   }
-  mass_fill(&body->whole, 1.0 - BETWEEN_SHARE * (double)(joints - 1), &def);
+  mass_fill(&body->whole, 1.0 - share * (double)(parts - 1), &def);
   def.geoms = geoms;
   def.geom_count = geoms_fill(work, model, body, geoms);
   HAPI_TRY(part_add(work, body, &def, scene, &body->number));
@@ -300,9 +325,10 @@ static hap_status carrier_add(import_work *work, const import_model *model, impo
     HAPI_TRY(joint_add(work, body, joint, (const uint32_t[2]){body->number, below}, scene));
   } else {
     hap_joint_def none;
-    spring_fill(work, joint, &none);
+    hap_joint_def_init(&none, sizeof none);
+    spring_fill(work, joint, 0, &none);
   }
-  if (joints > 1 && parent_number != HAP_SCENE_WORLD) {
+  if (parts > 1 && parent_number != HAP_SCENE_WORLD) {
     return hap_scene_let_pass(scene, body->number, parent_number, work->detail);
   }
   return HAP_OK;

@@ -149,10 +149,10 @@ static void joint_add(const rig *r, hap_joint_kind kind, uint32_t a, uint32_t b,
   def.kind = kind;
   def.body_a = a;
   def.body_b = b;
-  def.stiffness = c->stiffness;
-  def.rest = c->rest;
-  def.damping = c->damping;
-  def.inertia = c->inertia;
+  def.stiffness[0] = c->stiffness;
+  def.rest[0] = c->rest;
+  def.damping[0] = c->damping;
+  def.inertia[0] = c->inertia;
   REQUIRE_SAY(hap_scene_add_joint(r->scene, &def, NULL, &why) == HAP_OK, "%s", why.text);
 }
 
@@ -231,6 +231,44 @@ TEST(the_world_has_the_same_motion_in_its_own_steps)
   }
 }
 
+/* Two axes at right angles, small angles: each moves as if it were alone. */
+TEST(the_axes_of_a_universal_joint_move_as_their_equations_say)
+{
+  static const axis_case cases[2] = {{"first", 0.3, 0.06, 2e-3, 1e-3, 0.0},
+                                     {"second", 0.5, -0.05, 3e-3, 0.0, 0.0}};
+  for (int i = 0; i < 3; ++i) {
+    rig r;
+    hap_joint_def def;
+    double worst = 0.0;
+    rig_open(&r, 0.0);
+    hap_joint_def_init(&def, sizeof def);
+    def.kind = HAP_JOINT_UNIVERSAL;
+    def.body_a = box_add(&r, 0.0, 0.1);
+    for (int k = 0; k < 2; ++k) { /* x and y */
+      memset(def.axis[k], 0, sizeof def.axis[k]);
+      def.axis[k][k] = 1.0;
+      def.stiffness[k] = cases[k].stiffness;
+      def.rest[k] = cases[k].rest;
+      def.damping[k] = cases[k].damping;
+      def.inertia[k] = cases[k].inertia;
+    }
+    REQUIRE(hap_scene_add_joint(r.scene, &def, NULL, NULL) == HAP_OK);
+    rig_start(&r, i == 2 ? HAP_MODEL_SINGLE : HAP_MODEL_CONTACT, i == 0 ? 20.0 : 60.0,
+              "virtual:path=0:0/0/0.07");
+    REQUIRE(hap_session_advance(r.session, 60) == HAP_OK);
+    for (int ms = 80; ms <= 1000; ms += 20) {
+      REQUIRE(hap_session_advance(r.session, 20) == HAP_OK);
+      const hap_pose pose = pose_now(&r, 0);
+      for (int k = 0; k < 2; ++k) {
+        double right = motion_of(&cases[k], INERTIA, 1e-3 * ms - r.late_s);
+        worst = fmax(worst, fabs(2.0 * pose.quat_wxyz[1 + k] - right));
+      }
+    }
+    CHECK_SAY(worst < 2e-3, "%d: %g rad", i, worst);
+    rig_close(&r);
+  }
+}
+
 TEST(a_slider_moves_as_its_equation_says)
 {
   static const axis_case along = {"along", 200.0, 0.0, 2.0, 0.3, 0.5};
@@ -295,9 +333,9 @@ TEST(a_spring_rests_on_a_stop)
     def.body_a = box_add(&r, 0.0, 0.1);
     def.low[0] = -0.1;
     def.high[0] = 0.3;
-    def.stiffness = 0.5;
-    def.rest = i == 1 ? -1.0 : 1.0;
-    def.damping = 0.02;
+    def.stiffness[0] = 0.5;
+    def.rest[0] = i == 1 ? -1.0 : 1.0;
+    def.damping[0] = 0.02;
     REQUIRE(hap_scene_add_joint(r.scene, &def, NULL, NULL) == HAP_OK);
     rig_start(&r, HAP_MODEL_CONTACT, 60.0, i == 2 ? "virtual:path=0:0/0/0.065" : NULL);
     for (int ms = 0; ms < 2000; ms += 10) {
@@ -321,9 +359,9 @@ TEST(friction_and_a_spring_stand_beside_each_other)
     hap_joint_def_init(&def, sizeof def);
     def.kind = HAP_JOINT_HINGE;
     def.body_a = box_add(&r, 0.0, 0.1);
-    def.stiffness = 0.5;
-    def.rest = 0.4;
-    def.damping = 0.08;
+    def.stiffness[0] = 0.5;
+    def.rest[0] = 0.4;
+    def.damping[0] = 0.08;
     def.motor_force[0] = i % 2 == 0 ? 0.25 : 0.1;
     REQUIRE(hap_scene_add_joint(r.scene, &def, NULL, NULL) == HAP_OK);
     rig_start(&r, HAP_MODEL_CONTACT, 60.0, i < 2 ? "virtual:path=0:0/0/0.065" : NULL);
@@ -384,13 +422,13 @@ TEST(what_cannot_be_is_refused)
   hap_joint_def_init(&def, sizeof def);
   def.body_a = box_add(&r, 0.0, 0.1);
   def.kind = HAP_JOINT_BALL;
-  def.damping = 1.0;
+  def.damping[0] = 1.0;
   CHECK(hap_scene_add_joint(r.scene, &def, NULL, &why) == HAP_ERROR_ARGUMENT);
-  CHECK(strstr(why.text, "HINGE and SLIDER") != NULL);
+  CHECK(strstr(why.text, "HINGE, SLIDER") != NULL);
   def.kind = HAP_JOINT_HINGE;
   const double wrong[] = {-1.0, NAN, INFINITY, 1e10};
   for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
-    def.damping = wrong[i];
+    def.damping[0] = wrong[i];
     CHECK(hap_scene_add_joint(r.scene, &def, NULL, &why) == HAP_ERROR_ARGUMENT);
     CHECK(strstr(why.text, "damping") != NULL);
   }

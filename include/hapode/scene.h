@@ -167,13 +167,13 @@ typedef struct hap_joint_def {
   double high[2];
   double motor_speed[2]; /* rad/s or m/s, default 0 */
   double motor_force[2]; /* N m or N, default 0: no motor. With speed 0 it is friction */
-  /* Axis 0 of HINGE and SLIDER, beside stops and motor. 0..1e9, default 0: a spring (N m/rad, N/m)
+  /* HINGE, SLIDER and UNIVERSAL, beside stops and motor. 0..1e9, default 0: a spring (N m/rad, N/m)
    * that rests at a position (rad, m, where the joint is now: 0), a damper (N m s/rad, N s/m), and
    * the inertia of a rotor that turns with the axis alone (kg m^2, kg). */
-  double stiffness;
-  double rest;
-  double damping;
-  double inertia;
+  double stiffness[2];
+  double rest[2];
+  double damping[2];
+  double inertia[2];
 } hap_joint_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

@@ -358,9 +358,9 @@ static void fill_limit(const publishing *p, dJointID joint, parameter_fn get, in
 }
 
 /* Forces are those of the application's time, velocities those of the hand's. */
-static void fill_spring(const publishing *p, dJointID joint, hapi_model_limit *out)
+static void fill_spring(const publishing *p, dJointID joint, uint32_t axis, hapi_model_limit *out)
 {
-  const hapi_spring *spring = hapi_spring_of(p->world->springs, joint);
+  const hapi_spring *spring = hapi_spring_of(p->world->springs, joint, axis);
   double scale = hapi_cycle_scale(p->cycle);
   if (spring != NULL) {
     out->flags |= HAPI_LIMIT_SPRING;
@@ -384,8 +384,8 @@ static void fill_parameters(const publishing *p, const hapi_known_joint *known, 
   for (int i = 0; i < traits->groups; ++i) {
     bool turns = known->kind != HAPI_JOINT_SLIDER;
     fill_limit(p, joint, traits->get, i * dParamGroup, turns, &out->limits[i]);
+    fill_spring(p, joint, (uint32_t)i, &out->limits[i]);
   }
-  fill_spring(p, joint, &out->limits[0]);
   if (traits->soft == HAPI_SOFT_SUSPENSION) {
     out->limits[1].flags &= HAPI_LIMIT_MOTOR; /* ODE never stops the second axis */
     out->along = softness_of(p, traits->get(joint, dParamSuspensionERP),

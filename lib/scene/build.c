@@ -364,9 +364,10 @@ void hapi_scene_joint_set(const hapi_scene_joint *joint, int parameter, uint32_t
   makings[joint->kind].set_parameter(joint->joint, parameter + (int)axis * dParamGroup, value);
 }
 
-static hapi_axis_spring spring_of(const hap_joint_def *def)
+static hapi_axis_spring spring_of(const hap_joint_def *def, uint32_t axis)
 {
-  return (hapi_axis_spring){def->stiffness, def->rest, def->damping, def->inertia};
+  return (hapi_axis_spring){def->stiffness[axis], def->rest[axis], def->damping[axis],
+                            def->inertia[axis]};
 }
 
 /* Of the free axes: whether stops and motor can be. */
@@ -394,20 +395,25 @@ static hap_status axes_check(const hap_joint_def *def, hap_detail *detail)
   return HAP_OK;
 }
 
-static hap_status spring_check(const hap_joint_def *def, hap_detail *detail)
+static hap_status springs_check(const hap_joint_def *def, hap_detail *detail)
 {
   const hapi_number_rule rules[] = {
-      HAPI_RULE(def, stiffness, 0.0, 1e9),
-      HAPI_RULE(def, rest, -1e6, 1e6),
-      HAPI_RULE(def, damping, 0.0, 1e9),
-      HAPI_RULE(def, inertia, 0.0, 1e9),
+      HAPI_RULE(def, stiffness[0], 0.0, 1e9), HAPI_RULE(def, stiffness[1], 0.0, 1e9),
+      HAPI_RULE(def, rest[0], -1e6, 1e6),     HAPI_RULE(def, rest[1], -1e6, 1e6),
+      HAPI_RULE(def, damping[0], 0.0, 1e9),   HAPI_RULE(def, damping[1], 0.0, 1e9),
+      HAPI_RULE(def, inertia[0], 0.0, 1e9),   HAPI_RULE(def, inertia[1], 0.0, 1e9),
   };
-  const hapi_axis_spring spring = spring_of(def);
+  const bool can = def->kind == HAP_JOINT_HINGE || def->kind == HAP_JOINT_SLIDER ||
+                   def->kind == HAP_JOINT_UNIVERSAL;
   HAPI_TRY(hapi_numbers_check(rules, sizeof rules / sizeof rules[0], detail));
-  if (hapi_axis_spring_acts(&spring) && def->kind != HAP_JOINT_HINGE &&
-      def->kind != HAP_JOINT_SLIDER) {
-    return hapi_fail(detail, HAP_ERROR_ARGUMENT,
-                     "stiffness, damping and inertia are of HINGE and SLIDER only");
+  for (uint32_t i = 0; i < 2; ++i) {
+    const hapi_axis_spring spring = spring_of(def, i);
+    if (hapi_axis_spring_acts(&spring) && (!can || i >= hapi_scene_joint_axes(def->kind))) {
+      return hapi_fail(detail, HAP_ERROR_ARGUMENT,
+                       "stiffness[%u], damping[%u], inertia[%u]: only axes of HINGE, SLIDER and "
+                       "UNIVERSAL have them",
+                       i, i, i);
+    }
   }
   return HAP_OK;
 }
@@ -430,7 +436,7 @@ static hap_status joint_check(const hap_scene *scene, const hap_joint_def *def, 
     return hapi_fail(detail, HAP_ERROR_ARGUMENT, "anchor: not finite or beyond 1000 km");
   }
   HAPI_TRY(axes_check(def, detail));
-  return spring_check(def, detail);
+  return springs_check(def, detail);
 }
 
 static void joint_make(hap_scene *scene, const hap_joint_def *def, hapi_scene_joint *out)
@@ -441,6 +447,11 @@ static void joint_make(hap_scene *scene, const hap_joint_def *def, hapi_scene_jo
   dJointAttach(out->joint, scene->bodies[def->body_a].body, b != NULL ? b->body : NULL);
   if (making->set_anchor != NULL) {
     making->set_anchor(out->joint, def->anchor[0], def->anchor[1], def->anchor[2]);
+  }
+  if (def->kind == HAP_JOINT_UNIVERSAL) { /* on the way the axes are never along each other */
+    const double *first = def->axis[0];
+    const bool is_y = fabs(first[1]) > fabs(first[2]);
+    dJointSetUniversalAxis2(out->joint, 0.0, is_y ? 0.0 : 1.0, is_y ? 1.0 : 0.0);
   }
   for (int i = 0; i < 2; ++i) {
     if (making->set_axis[i] != NULL) {
@@ -460,10 +471,10 @@ static void joint_make(hap_scene *scene, const hap_joint_def *def, hapi_scene_jo
     hapi_scene_joint_set(out, dParamLoStop, i, fmax(def->low[i], -most)); /* ODE wants it twice */
     hapi_scene_joint_set(out, dParamVel, i, def->motor_speed[i]);
     hapi_scene_joint_set(out, dParamFMax, i, def->motor_force[i]);
-  }
-  const hapi_axis_spring spring = spring_of(def);
-  if (hapi_axis_spring_acts(&spring)) {
-    hapi_spring_make(&scene->springs, scene->world, out->joint, &spring);
+    const hapi_axis_spring spring = spring_of(def, i);
+    if (hapi_axis_spring_acts(&spring)) {
+      hapi_spring_make(&scene->springs, scene->world, out->joint, i, &spring);
+    }
   }
 }
 
@@ -479,7 +490,7 @@ hap_status hap_scene_add_joint(hap_scene *scene, const hap_joint_def *given, uin
   HAPI_TRY(hapi_scene_may_edit(scene, detail));
   if (!hapi_reserve((void **)&scene->joints, &scene->joint_capacity, scene->joint_count, 1,
                     sizeof *scene->joints) ||
-      !hapi_reserve((void **)&scene->springs.of, &scene->springs.capacity, scene->springs.count, 1,
+      !hapi_reserve((void **)&scene->springs.of, &scene->springs.capacity, scene->springs.count, 2,
                     sizeof *scene->springs.of)) {
     return hapi_fail(detail, HAP_ERROR_MEMORY, "no memory for a joint");
   }
