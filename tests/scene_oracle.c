@@ -76,7 +76,7 @@ static void mass_compare(const comparing *c, const import_body *body, int i)
   hapi_m3_turn(r, diagonal, inertia);
   vectors_compare(c, "mass", body->name, &body->mass.mass, theirs->body_mass + i, 1);
   const double *m = body->mass.inertia;
-  const bool balanced = d[0] == d[1] && d[1] == d[2] && m[0] != m[4];
+  const bool balanced = d[0] == d[1] && d[1] == d[2] && !hapi_m3_is_scalar(m);
   if (body->mass.mass > 0.0 && c->by_names &&
       balanced) { /* by MuJoCo; hapode does so with a note */
     const double trace = m[0] + m[4] + m[8];

@@ -61,7 +61,8 @@ void run_frame_labels(const run_options *options, view_labels *out)
 {
   char devices[80];
   run_summary_devices(&options->rig, devices, sizeof devices);
-  snprintf(out->title, sizeof out->title, "%.90s", options->rig.scene);
+  const char *slash = strrchr(options->rig.scene, '/'); /* of a file its name alone */
+  snprintf(out->title, sizeof out->title, "%.90s", slash != NULL ? slash + 1 : options->rig.scene);
   snprintf(out->subtitle, sizeof out->subtitle, "model %s, physics %g Hz, haptic %g Hz, %.*s",
            hap_model_name(options->rig.def.model), run_summary_physics_hz(options),
            options->rig.def.haptic_hz, (int)strcspn(devices, ":"), devices);
