@@ -63,14 +63,13 @@ static hap_status inertial_read(mjcf *m, const xml_element *element, const mjcf_
 /* NULL: no memory. */
 static const char *name_join(mjcf *m, const char *name, const char *suffix)
 {
-  const size_t length = strlen(name);
+  const size_t size = strlen(name) + strlen(suffix) + 1;
   if (suffix[0] == '\0') {
     return name;
   }
-  char *joined = import_take(m->work, length + strlen(suffix) + 1);
+  char *joined = import_take(m->work, size);
   if (joined != NULL) {
-    memcpy(joined, name, length);
-    memcpy(joined + length, suffix, strlen(suffix));
+    (void)snprintf(joined, size, "%s%s", name, suffix);
   }
   return joined;
 }

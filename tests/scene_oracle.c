@@ -20,7 +20,8 @@ typedef struct comparing {
   oracle_found *out;
 } comparing;
 
-static void differ(const comparing *c, const char *what, const char *of, double ours, double theirs)
+static void number_differs(const comparing *c, const char *what, const char *of, double ours,
+                           double theirs)
 {
   if (c->out->differ++ == 0) {
     (void)snprintf(c->out->first, sizeof c->out->first, "%s of \"%s\" is %.9g and not %.9g", what,
@@ -37,7 +38,7 @@ static void vectors_compare(const comparing *c, const char *what, const char *of
   }
   for (int k = 0; k < count; ++k) {
     if (!(fabs(ours[k] - theirs[k]) < NEAR * fmax(1.0, largest))) {
-      differ(c, what, of, ours[k], theirs[k]);
+      number_differs(c, what, of, ours[k], theirs[k]);
     }
   }
 }
@@ -46,7 +47,7 @@ static void flags_compare(const comparing *c, const char *what, const char *of, 
                           double theirs)
 {
   if (ours != theirs) {
-    differ(c, what, of, ours, theirs);
+    number_differs(c, what, of, ours, theirs);
   }
 }
 
@@ -155,7 +156,7 @@ static void geom_compare(const comparing *c, const import_geom *geom, int g)
     const float *rgba = material < 0 || !is_default ? theirs->geom_rgba + 4 * (ptrdiff_t)g
                                                     : theirs->mat_rgba + 4 * (ptrdiff_t)material;
     if (!(fabsf(geom->colour_rgba[k] - rgba[k]) < 1e-6F)) {
-      differ(c, "colour", name, (double)geom->colour_rgba[k], (double)rgba[k]);
+      number_differs(c, "colour", name, (double)geom->colour_rgba[k], (double)rgba[k]);
     }
   }
 }
@@ -189,17 +190,17 @@ static void body_compare(const comparing *c, const import_body *body, int i)
   }
   for (const import_joint *joint = body->joints; joint != NULL; joint = joint->next, ++j) {
     if (j >= last_joint) {
-      differ(c, "number of joints", body->name, 1 + j, last_joint);
+      number_differs(c, "number of joints", body->name, 1 + j, last_joint);
       break;
     }
     joint_compare(c, joint, j);
   }
   if (j >= 0 && j < last_joint) {
-    differ(c, "number of joints", body->name, j, last_joint);
+    number_differs(c, "number of joints", body->name, j, last_joint);
   }
   for (const import_geom *geom = body->geoms; geom != NULL; geom = geom->next, ++g) {
     if (g >= last_geom) {
-      differ(c, "number of geoms", body->name, 1 + g, last_geom);
+      number_differs(c, "number of geoms", body->name, 1 + g, last_geom);
       break;
     }
     geom_compare(c, geom, g);
@@ -208,7 +209,7 @@ static void body_compare(const comparing *c, const import_body *body, int i)
     }
   }
   if (g >= 0 && g < last_geom) {
-    differ(c, "number of geoms", body->name, g, last_geom);
+    number_differs(c, "number of geoms", body->name, g, last_geom);
   }
 }
 
@@ -226,7 +227,7 @@ static void model_compare(const comparing *c, const import_model *ours)
     const int i =
         !c->by_names || count == 0 ? count : mj_name2id(c->theirs, mjOBJ_BODY, body->name);
     if (i < 0 || i >= c->theirs->nbody) {
-      differ(c, "number of bodies", body->name, 1 + count, c->theirs->nbody);
+      number_differs(c, "number of bodies", body->name, 1 + count, c->theirs->nbody);
       return;
     }
     body_compare(c, body, i);

@@ -27,19 +27,26 @@ static inline bool hapi_axis_spring_acts(const hapi_axis_spring *s)
  *   force = k (q - rest) + c v' + J (v' - v) / h,   c = d
  *
  * With q' = q + h v' that loses and gains no energy where d is 0, and is stable while h^2 k m < 4,
- * m being what a unit impulse does to the velocity. A stiffer spring needs c >= k h / 2 - 2 / (h m);
- * with 1 in place of 2 as much is kept in hand. A part of k h is always there, so that a row can be
- * made of a spring alone. */
+ * m being what a unit impulse does to the velocity. A stiffer spring needs
+ * c >= k h / 2 - 2 / (h m); with 1 in place of 2 as much is kept in hand. A part of k h is always
+ * there, so that a row can be made of a spring alone. */
 #define HAPI_SPRING_LEAST 1e-3
 
-static inline void hapi_axis_spring_row(const hapi_axis_spring *s, double h, double mobility,
-                                        double position, double rate, double *out_speed,
+/* Of an axis before a step. */
+typedef struct hapi_axis_state {
+  double position;
+  double rate;
+  double mobility; /* m, of the free bodies */
+} hapi_axis_state;
+
+static inline void hapi_axis_spring_row(const hapi_axis_spring *s, double h,
+                                        const hapi_axis_state *at, double *out_speed,
                                         double *out_cfm)
 {
   double stiff = h * s->stiffness;
-  double least = fmax(0.5 * stiff - 1.0 / (h * mobility), HAPI_SPRING_LEAST * stiff);
+  double least = fmax(0.5 * stiff - 1.0 / (h * at->mobility), HAPI_SPRING_LEAST * stiff);
   double all = s->inertia / h + fmax(s->damping, least);
-  *out_speed = (s->inertia / h * rate + s->stiffness * (s->rest - position)) / all;
+  *out_speed = (s->inertia / h * at->rate + s->stiffness * (s->rest - at->position)) / all;
   *out_cfm = 1.0 / all;
 }
 

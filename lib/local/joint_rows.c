@@ -496,9 +496,9 @@ static void add_spring(hapi_rows *rows, double period, const placed_joint *j, in
   double cfm;
   hapi_row *row = axis_row(rows, j, which, 3, 1.0);
   if (row != NULL) {
-    double mobility = hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb);
-    hapi_axis_spring_row(&j->in->limits[which].spring, period, mobility, position, speed_of(j, row),
-                         &row->target, &cfm);
+    const hapi_axis_state at = {position, speed_of(j, row),
+                                hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb)};
+    hapi_axis_spring_row(&j->in->limits[which].spring, period, &at, &row->target, &cfm);
     newest_source(rows)->gives = true;
     finish_row(rows, period, cfm);
   }

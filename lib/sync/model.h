@@ -29,8 +29,8 @@ enum {
   HAPI_LIMIT_SPRING = 16
 };
 
-/* Stops, motor and spring of one free axis. Positions as ODE measures them: how far the first body is
- * turned or moved against the second one, rad or m. */
+/* Stops, motor and spring of one free axis. Positions as ODE measures them: how far the first body
+ * is turned or moved against the second one, rad or m. */
 typedef struct hapi_model_limit {
   uint32_t flags;
   double low;

@@ -177,8 +177,8 @@ void hapi_springs_set(const hapi_springs *springs, double step_s)
     double speed;
     double cfm;
     if (spring->joint != NULL) {
-      hapi_axis_spring_row(&spring->is, step_s, spring->mobility, position_read(spring),
-                           rate_read(spring), &speed, &cfm);
+      const hapi_axis_state at = {position_read(spring), rate_read(spring), spring->mobility};
+      hapi_axis_spring_row(&spring->is, step_s, &at, &speed, &cfm);
       motor_set(spring, dParamVel, speed);
       motor_set(spring, dParamCFM, cfm);
     }
