@@ -64,7 +64,7 @@ static double rate_read(const hapi_spring *spring)
  * do. */
 static dJointID motor_make(dWorldID world, dJointID joint, uint32_t number)
 {
-  dVector3 axis;
+  dVector3 axis = {0.0, 0.0, 0.0, 0.0};
   const bool slides = joint_slides(joint);
   dJointID motor = slides ? dJointCreateLMotor(world, NULL) : dJointCreateAMotor(world, NULL);
   const int with = number == 0 ? 1 : dJointGetBody(joint, 1) != NULL ? 2 : 0;
@@ -105,7 +105,7 @@ static double axis_mobility(dJointID joint, uint32_t number)
   static const double none[3] = {0.0, 0.0, 0.0};
   dBodyID a = dJointGetBody(joint, 0);
   dBodyID b = dJointGetBody(joint, 1);
-  dVector3 axis;
+  dVector3 axis = {0.0, 0.0, 0.0, 0.0};
   double lever[3] = {0.0, 0.0, 0.0};
   double torque[3];
   axis_read(joint, number, axis);
