@@ -109,6 +109,7 @@ build_is_good() {
     meson configure "$build" >/dev/null 2>&1 </dev/null
 }
 
+# build_all [TARGET...]: everything where none is named.
 build_all() {
   local options
   read -ra options <<<"${HAPODE_MESON_OPTIONS:-}"
@@ -121,5 +122,5 @@ build_all() {
     quietly "$build/setup.log" meson configure "$build" "${options[@]}"
   fi
   say "building"
-  quietly "$build/compile.log" meson compile -C "$build"
+  quietly "$build/compile.log" meson compile -C "$build" "$@"
 }
