@@ -263,7 +263,7 @@ static hap_status joint_add(import_work *work, const import_body *body, const im
     spring_fill(work, of[axis], axis, &def);
     if (joint->kind != IMPORT_BALL) {
       limits_fill(work, of[axis], axis, &def);
-      def.motor_force[axis] = of[axis]->friction;
+      def.motor_force[axis] = fmin(of[axis]->friction, 1e9);
     } else if (joint->friction > 0.0) {
       import_note(work, joint->at, "joint %.60s: friction of a ball joint left out", joint->name);
     }

@@ -286,6 +286,25 @@ TEST(a_slider_moves_as_its_equation_says)
   }
 }
 
+/* Its period is far below the tick: it goes to its place and stays there. */
+TEST(a_spring_that_is_too_stiff_for_a_step_comes_to_rest)
+{
+  static const double stiffness[] = {1e4, 1e6, 1e9};
+  for (size_t i = 0; i < 6; ++i) {
+    const axis_case stiff = {"stiff", stiffness[i % 3], 0.2, 0.0, 0.0, 0.0};
+    rig r;
+    rig_open(&r, 0.0);
+    joint_add(&r, HAP_JOINT_HINGE, box_add(&r, 0.0, 0.1), HAP_SCENE_WORLD, &stiff);
+    rig_start(&r, HAP_MODEL_CONTACT, 60.0, i < 3 ? "virtual:path=0:0/0/0.065" : NULL);
+    for (int ms = 0; ms < 500; ms += 10) {
+      REQUIRE(hap_session_advance(r.session, 10) == HAP_OK);
+      CHECK_SAY(fabs(turn_now(&r, 0)) < 0.5, "%zu: %g rad", i, turn_now(&r, 0));
+    }
+    CHECK_NEAR(turn_now(&r, 0), 0.2, 1e-3);
+    rig_close(&r);
+  }
+}
+
 /* ---- loads ---- */
 
 TEST(a_weight_hangs_on_its_spring)

@@ -26,10 +26,11 @@ static inline bool hapi_axis_spring_acts(const hapi_axis_spring *s)
  *
  *   force = k (q - rest) + c v' + J (v' - v) / h,   c = d
  *
- * With q' = q + h v' that loses and gains no energy where d is 0, and is stable while h^2 k m < 4,
- * m being what a unit impulse does to the velocity. A stiffer spring needs
- * c >= k h / 2 - 2 / (h m); with 1 in place of 2 as much is kept in hand. A part of k h is always
- * there, so that a row can be made of a spring alone. */
+ * With q' = q + h v' that loses and gains no energy where d is 0, and is stable while
+ * x = h^2 k m < 4, m being what a unit impulse does to the velocity. A stiffer spring needs
+ * c >= (1 / 2 - 2 / x) k h. From x = 1 on c is at least a growing share of k h, from x = 5 on all of
+ * it: such a spring comes to rest within a step. A part of k h is always there, so that a row can be
+ * made of a spring alone. */
 #define HAPI_SPRING_LEAST 1e-3
 
 /* Of an axis before a step. */
@@ -44,8 +45,8 @@ static inline void hapi_axis_spring_row(const hapi_axis_spring *s, double h,
                                         double *out_cfm)
 {
   double stiff = h * s->stiffness;
-  double least = fmax(0.5 * stiff - 1.0 / (h * at->mobility), HAPI_SPRING_LEAST * stiff);
-  double all = s->inertia / h + fmax(s->damping, least);
+  double share = fmin(fmax(0.25 * (h * stiff * at->mobility - 1.0), HAPI_SPRING_LEAST), 1.0);
+  double all = s->inertia / h + fmax(s->damping, share * stiff);
   *out_speed = (s->inertia / h * at->rate + s->stiffness * (s->rest - at->position)) / all;
   *out_cfm = 1.0 / all;
 }
