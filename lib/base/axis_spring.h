@@ -28,9 +28,9 @@ static inline bool hapi_axis_spring_acts(const hapi_axis_spring *s)
  *
  * With q' = q + h v' that loses and gains no energy where d is 0, and is stable while
  * x = h^2 k m < 4, m being what a unit impulse does to the velocity. A stiffer spring needs
- * c >= (1 / 2 - 2 / x) k h. From x = 1 on c is at least a growing share of k h, from x = 5 on all of
- * it: such a spring comes to rest within a step. A part of k h is always there, so that a row can be
- * made of a spring alone. */
+ * c >= (1 / 2 - 2 / x) k h. From x = 1 on c is at least a growing share of k h, from x = 5 on all
+ * of it: such a spring comes to rest within a step. A part of k h is always there, so that a row
+ * can be made of a spring alone. */
 #define HAPI_SPRING_LEAST 1e-3
 
 /* Of an axis before a step. */
