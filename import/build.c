@@ -199,10 +199,15 @@ static void limits_fill(import_work *work, const import_joint *joint, int axis, 
 static void spring_fill(import_work *work, const import_joint *joint, int axis, hap_joint_def *out)
 {
   const bool has_axis = joint->kind == IMPORT_HINGE || joint->kind == IMPORT_SLIDER;
-  const double values[] = {joint->stiffness, joint->damping, joint->armature};
+  const bool far = joint->kind == IMPORT_HINGE && fabs(joint->rest) > M_PI; /* see limits_fill */
+  const double values[] = {far ? 0.0 : joint->stiffness, joint->damping, joint->armature};
   static const char *const names[] = {"stiffness", "damping", "armature"};
   double *const to[] = {out->stiffness, out->damping, out->inertia};
   out->rest[axis] = joint->rest;
+  if (far && joint->stiffness != 0.0) {
+    import_note(work, joint->at, "joint %.60s: spring that rests beyond half a turn left out",
+                joint->name);
+  }
   for (int i = 0; i < 3; ++i) {
     if (has_axis && values[i] >= 0.0 && values[i] <= 1e9) {
       to[i][axis] = values[i];

@@ -653,6 +653,8 @@ static const struct {
 } left_out[] = {
     {IN_WORLD("<body>\n<joint type='ball' stiffness='3'/><geom size='.1'/></body>"),
      "scene.xml:4: joint : stiffness left out\n"},
+    {IN_WORLD("<body>\n<joint stiffness='3' springref='200'/><geom size='.1'/></body>"),
+     "scene.xml:4: joint : spring that rests beyond half a turn left out\n"},
     {IN_WORLD("<body>\n<joint damping='1 0 2'/><geom size='.1'/></body>"),
      "scene.xml:4: joint: what is not linear of damping left out\n"},
     {IN_WORLD("<body name='b'><geom size='.1'/>\n<body name='a'><joint/></body></body>"),
