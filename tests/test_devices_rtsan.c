@@ -91,7 +91,7 @@ static int child_status(const char *spec, bool wrong)
   pid_t child = fork();
   if (child == 0) {
     if (wrong) {
-      (void)freopen("/dev/null", "w", stderr);
+      CHECK(freopen("/dev/null", "w", stderr) != NULL);
     } else {
       dup2(1, 2);
     }

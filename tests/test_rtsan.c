@@ -33,6 +33,7 @@ int main(void)
 #include "haptic/haptic_internal.h"
 #include "session/session_internal.h"
 #include "sync/exchange.h"
+#include "tick/report.h"
 
 #define TICKS 10000
 #define TICK_NS 1000000LL
@@ -270,8 +271,9 @@ static void physics_cycles(void)
   hap_stats stats;
   memset(&stats, 0, sizeof stats);
   hapi_haptic_stats(haptic, &stats);
-  if (rubbed < 500 || stats.ticks != TICKS || stats.contact_ticks < 100 ||
-      stats.models_adopted < 900 || stats.contact_passes < 900 || stats.solver_sweeps < 1000) {
+  if (rubbed < 500 || stats.loop.ticks != TICKS || stats.loop.contact_ticks < 100 ||
+      stats.loop.models_adopted < 900 || stats.contact.passes < 900 ||
+      stats.contact.sweeps < 1000) {
     fprintf(stderr, "the loop did not do its work\n");
     _exit(1);
   }

@@ -214,7 +214,7 @@ static hap_status geoms_read(const hap_body_def *def, hap_geom_def *out, hap_det
 }
 
 /* As ODE sees it, which ends the process otherwise. */
-static bool matrix_positive(const double m[3][3])
+static bool matrix_positive(const double (*m)[3])
 {
   const dReal rows[12] = {m[0][0], m[0][1], m[0][2], 0.0,     m[1][0], m[1][1],
                           m[1][2], 0.0,     m[2][0], m[2][1], m[2][2], 0.0};
