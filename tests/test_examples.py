@@ -570,6 +570,10 @@ def main(programs):
     for path in sorted((root / "examples").glob("*.c")):
         lines = len(path.read_text(encoding="utf-8").splitlines())
         point(lines <= 80, f"{path.name} has at most 80 lines", f"{lines} lines")
+    for path in sorted((root / "examples").glob("*/*.[ch]")):
+        lines = len(path.read_text(encoding="utf-8").splitlines())
+        point(lines <= 120, f"{path.parent.name}/{path.name} has at most 120 lines",
+              f"{lines} lines")
     point(len(example_of("touch_a_cube").splitlines()) <= 45, "the README's example is short")
     point("examples/frame_loop.c" in read("README.md"), "the README speaks of the frame loop")
     for program in programs:

@@ -131,7 +131,7 @@ def pieces():
 
 
 def bad_code(flags):
-    examples = [path.read_text(encoding="utf-8") for path in (root / "examples").glob("*.c")]
+    examples = [path.read_text(encoding="utf-8") for path in (root / "examples").rglob("*.c")]
     for where, text in pieces():
         if any(text in example for example in examples):
             continue  # meson compiles it
