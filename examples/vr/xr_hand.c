@@ -20,21 +20,22 @@ XrResult xr_hand_locate(xr_rig *rig, xr_view *out)
                                        XR_SPACE_LOCATION_POSITION_TRACKED_BIT;
   const XrVector3f *p = &place.pose.position;
   const XrQuaternionf *q = &place.pose.orientation;
-  double norm = sqrt(q->x * q->x + q->y * q->y + q->z * q->z + q->w * q->w);
+  const double w = q->w, x = q->x, y = q->y, z = q->z;
+  double norm = sqrt(w * w + x * x + y * y + z * z);
   out->has_hand = XR_SUCCEEDED(result) && rig->has_focus &&
                   (place.locationFlags & tracked) == tracked && fabs(norm - 1.0) < 0.01 &&
                   isfinite(p->x) && isfinite(p->y) && isfinite(p->z);
   if (out->has_hand) {
-    out->hand =
-        (hap_pose){{p->x, p->y, p->z}, {q->w / norm, q->x / norm, q->y / norm, q->z / norm}};
+    out->hand = (hap_pose){{p->x, p->y, p->z}, {w / norm, x / norm, y / norm, z / norm}};
   }
   if (out->has_hand && (velocity.velocityFlags & XR_SPACE_VELOCITY_LINEAR_VALID_BIT) != 0) {
     const XrVector3f *v = &velocity.linearVelocity;
     out->twist = (hap_twist){{v->x, v->y, v->z}, {0}};
   }
   if (out->has_hand && (velocity.velocityFlags & XR_SPACE_VELOCITY_ANGULAR_VALID_BIT) != 0) {
-    const XrVector3f *w = &velocity.angularVelocity;
-    out->twist.angular[0] = w->x, out->twist.angular[1] = w->y, out->twist.angular[2] = w->z;
+    const XrVector3f *turn = &velocity.angularVelocity;
+    out->twist.angular[0] = turn->x, out->twist.angular[1] = turn->y;
+    out->twist.angular[2] = turn->z;
   }
   return result;
 }

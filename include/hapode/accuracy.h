@@ -54,15 +54,15 @@ typedef struct hap_accuracy_info {
   uint32_t probe;            /* hap_probe: SHARED, PAPER or OPERATING */
   double accuracy;           /* 0..1, asked for, or as force_error_wanted needs */
   double force_error_wanted; /* of hap_expert_def; 0: none */
-  hap_accuracy_side tick;
-  hap_accuracy_side physics;
-  double contact_hz;    /* Hz */
-  int32_t max_sweeps;   /* of a solve; 0: until it is solved, or row_updates are made */
-  int32_t range_hops;   /* HAP_RANGE_ALL: as far as max_bodies allows */
-  int32_t iterations;   /* of QuickStep, in the newest physics step */
-  uint32_t shapes;      /* 1: shapes at every tick; 0: planes, where effect SHAPE is auto */
-  uint32_t row_updates; /* the most that a solve of a tick may make */
-  double reuse;         /* m */
+  hap_accuracy_side tick;    /* ticks of the haptic loop */
+  hap_accuracy_side physics; /* cycles of physics */
+  double contact_hz;         /* Hz */
+  int32_t max_sweeps;        /* of a solve; 0: until it is solved, or row_updates are made */
+  int32_t range_hops;        /* HAP_RANGE_ALL: as far as max_bodies allows */
+  int32_t iterations;        /* of QuickStep, in the newest physics step */
+  uint32_t shapes;           /* 1: shapes at every tick; 0: planes, where effect SHAPE is auto */
+  uint32_t row_updates;      /* the most that a solve of a tick may make */
+  double reuse;              /* m */
 } hap_accuracy_info;
 
 /* [any] Turns the dial from the next sync on, 0..1. HAP_ERROR_ARGUMENT: out of range.

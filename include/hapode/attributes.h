@@ -34,12 +34,13 @@
 #define HAP_PRINTF(format_index, first_argument)
 #endif
 
+/* Around declarations: they are those of C, in C++ too. */
 #ifdef __cplusplus
-#define HAP_BEGIN_DECLS extern "C" {
-#define HAP_END_DECLS }
+#define HAP_BEGIN_DECLS extern "C" { /* before the first declaration */
+#define HAP_END_DECLS }              /* behind the last one */
 #else
-#define HAP_BEGIN_DECLS
-#define HAP_END_DECLS
+#define HAP_BEGIN_DECLS /* before the first declaration */
+#define HAP_END_DECLS   /* behind the last one */
 #endif
 
 #endif

@@ -13,6 +13,7 @@
 
 HAP_BEGIN_DECLS
 
+/* An open device: of the library or of a module, or of the application (hapode/device_impl.h). */
 typedef struct hap_device hap_device;
 
 #define HAP_EFFECTORS_MAX 16 /* of a device */
@@ -47,7 +48,7 @@ typedef struct hap_device_info {
   /* m, device frame: corners of the box in which the end effector's origin can be. Equal along an
    * axis: not known. */
   double workspace_low[3];
-  double workspace_high[3];
+  double workspace_high[3]; /* m, device frame: the opposite corner */
 } hap_device_info;
 
 /* What an axis measures. Values are never renumbered. */
@@ -69,13 +70,13 @@ typedef struct hap_axis_info {
   uint32_t kind; /* hap_axis_kind */
   uint32_t unit; /* hap_axis_unit */
   uint32_t reserved;
-  double low; /* of its values; low < high, both within 1e6 */
-  double high;
+  double low;       /* of its values; low < high, both within 1e6 */
+  double high;      /* largest value */
   double max_force; /* N, N m or 1, either way; 0: it gives no force */
   /* What the maker promises to hold, at any haptic_hz from 1 kHz on; in the unit of max_force by
    * that of the axis, and by that a second. 0: not known, else from 1e-15 to 1e9 */
   double rated_stiffness;
-  double rated_damping;
+  double rated_damping; /* likewise */
 } hap_axis_info;
 
 /* How strongly a vibrator shakes, and how fast. Final. */

@@ -41,7 +41,7 @@ typedef struct hap_device_input {
   uint32_t size;    /* bytes that there is room for */
   uint32_t buttons; /* bit 0 is the first one */
   hap_pose pose;    /* in the device's frame; a device of dof 3 gives a constant quaternion */
-  hap_twist twist;
+  hap_twist twist;  /* velocity of that pose, in the same axes */
   double axes[HAP_AXES_MAX];       /* as many as axis_count says, in the units of hap_axis_info */
   double axis_rates[HAP_AXES_MAX]; /* of those, a second */
 } hap_device_input;
@@ -54,7 +54,7 @@ typedef struct hap_device_output {
   uint32_t leds;                    /* bit 0 is the first one */
   hap_wrench wrench;                /* on the hand, in the device's frame */
   double axis_forces[HAP_AXES_MAX]; /* on the hand: positive ones open a gripper */
-  hap_vibration vibrators[HAP_VIBRATORS_MAX];
+  hap_vibration vibrators[HAP_VIBRATORS_MAX]; /* as many as vibrator_count says */
 } hap_device_output;
 
 /* Whether a struct of this build's headers, from a library of maybe another one, has the member. */

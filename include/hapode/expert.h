@@ -73,7 +73,7 @@ typedef struct hap_expert_def {
    * HAP_ERROR_ARGUMENT: an unknown bit, or one in both. HAP_ERROR_UNSUPPORTED: the model cannot
    * fulfil the wish. hap_session_set_effect changes a wish later. */
   uint32_t effects_on;
-  uint32_t effects_off;
+  uint32_t effects_off; /* effects that are off, likewise */
 
   /* model CONTACT, 1..64, default 1: parts of a step of the world, each with its own collision. The
    * bodies that the loop does not move come out as from a world stepped at physics_hz x substeps.

@@ -131,9 +131,9 @@ typedef struct hap_force_def {
   /* N, 0..1e6, the largest force of MAGNET, DETENTS and VIBRATION. Of the first two it is cut where
    * they are steeper than the spring that the device can hold: HAP_SATURATED */
   double strength;
-  double range; /* m, 1e-4..100, default 0.02, MAGNET: no force from there on */
-  double pitch; /* m, 1e-5..100, default 0.005, DETENTS */
-  hap_force_wave vibration;
+  double range;             /* m, 1e-4..100, default 0.02, MAGNET: no force from there on */
+  double pitch;             /* m, 1e-5..100, default 0.005, DETENTS */
+  hap_force_wave vibration; /* VIBRATION: how it goes in time */
 
   double fade_in_s; /* s, 0..60, default 0.02: after add the force comes in linearly */
   /* What it promises; the guard holds it to that. 0 (default): what the fields above come to. Of
@@ -202,7 +202,7 @@ typedef struct hap_force_state {
   uint64_t calls;      /* so many */
   uint64_t late_calls; /* those that took longer than call_most_s */
   double us_mean;      /* us a call */
-  double us_max;
+  double us_max;       /* us, the longest call */
 } hap_force_state;
 
 /* [any] State of an own force. size_of_out: sizeof *out of the caller's build. HAP_END: its call

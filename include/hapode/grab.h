@@ -47,7 +47,7 @@ typedef struct hap_grab_def {
   /* N and N m, 0..1e6: the grip gives way at this force of its spring. 0 (default): at the largest
    * force and torque of the pointer, which the hand then feels whole. */
   double max_force;
-  double max_torque;
+  double max_torque; /* N m, likewise */
 } hap_grab_def;
 
 /* Why a grab has ended. Values are never renumbered. */

@@ -40,11 +40,11 @@ typedef struct hap_pointer_outputs {
   uint32_t leds;   /* bit 0 is the first one; default 0 */
   uint32_t reserved;
   hap_vibration vibrators[HAP_VIBRATORS_MAX]; /* amplitude 0..1, default 0; frequency 0..1e5 Hz */
-  hap_axis_push axes[HAP_AXES_MAX];
+  hap_axis_push axes[HAP_AXES_MAX];           /* forces on the axes; default none */
   /* Shares of the range of a gripper, 0..1: HAP_EVENT_GRIPPER says closed at the one and below, and
    * open at the other and above. Default 0.25 and 0.35, gripper_open above gripper_closed. */
   double gripper_closed;
-  double gripper_open;
+  double gripper_open; /* share from which on it is open */
 } hap_pointer_outputs;
 
 /* [any] Fills *outputs with defaults: nothing. size_of_outputs: sizeof *outputs of the caller's

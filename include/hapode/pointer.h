@@ -203,7 +203,7 @@ typedef struct hap_pointer_state {
    * over: the one before stands, with a rate of 0. */
   uint32_t axis_count; /* 0: none */
   uint32_t reserved;
-  double axes[HAP_AXES_MAX];
+  double axes[HAP_AXES_MAX];        /* values, as many as axis_count says */
   double axis_rates[HAP_AXES_MAX];  /* of those, a second */
   double axis_forces[HAP_AXES_MAX]; /* what was written to the device (outputs.h) */
   void *held; /* dBodyID, to be compared: what the pointer holds (grab.h); NULL: nothing */

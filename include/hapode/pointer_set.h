@@ -22,19 +22,19 @@ typedef enum hap_pointer_set_bit {
   HAP_SET_BASE = 1, /* pose_world_device, twist_world_device and base_time_ns */
   /* Without HAP_SET_BASE the pointer stays where it is while the scale changes. */
   HAP_SET_MOTION_SCALE = 2,
-  HAP_SET_FORCE_SCALE = 4,
-  HAP_SET_STIFFNESS = 8,
-  HAP_SET_DAMPING = 16,
-  HAP_SET_FRICTION = 32, /* friction and finger_radius */
-  HAP_SET_LIMITS = 64,   /* max_force and max_torque */
+  HAP_SET_FORCE_SCALE = 4, /* force_scale */
+  HAP_SET_STIFFNESS = 8,   /* stiffness */
+  HAP_SET_DAMPING = 16,    /* damping */
+  HAP_SET_FRICTION = 32,   /* friction and finger_radius */
+  HAP_SET_LIMITS = 64,     /* max_force and max_torque */
   /* No field: what clutches have moved the device against the pointer is forgotten. */
   HAP_SET_UNCLUTCHED = 128,
   /* No field: the pointer leaps to where the base puts it. Without this bit it goes there within
    * 20 ms, or leaps where it is farther away than 0.2 m or 2 rad. */
   HAP_SET_TELEPORT = 256,
-  HAP_SET_SHAPE = 512, /* radius, hull_xyz and hull_points */
-  HAP_SET_COLLIDE_BITS = 1024,
-  HAP_SET_COUPLING = 2048 /* coupling, coupling_stiffness and coupling_damping */
+  HAP_SET_SHAPE = 512,         /* radius, hull_xyz and hull_points */
+  HAP_SET_COLLIDE_BITS = 1024, /* collide_bits */
+  HAP_SET_COUPLING = 2048      /* coupling, coupling_stiffness and coupling_damping */
 } hap_pointer_set_bit;
 
 /* Fields of hap_pointer_def that can be set later. It has a size and may grow at its end. */
@@ -48,20 +48,20 @@ typedef struct hap_pointer_settings {
   hap_twist twist_world_device; /* m/s, rad/s, world axes, of its origin; at most 1e6; default 0 */
   int64_t base_time_ns;         /* of hap_session_now: when the base was there; 0 (default): now */
   double motion_scale;          /* this and the next: range and meaning as in hap_pointer_def */
-  double force_scale;
-  double stiffness;
-  double damping;
-  double friction;
-  double finger_radius;
-  double max_force;
-  double max_torque;
-  double radius;
-  const double *hull_xyz; /* copied by hap_pointer_set */
-  size_t hull_points;
-  uint32_t collide_bits;
-  hap_coupling coupling; /* this and the next: as in hap_pointer_expert_def */
-  double coupling_stiffness;
-  double coupling_damping;
+  double force_scale;           /* device newtons for a world newton */
+  double stiffness;             /* N/m, of contacts */
+  double damping;               /* N s/m, of contacts */
+  double friction;              /* 0..10, of contacts */
+  double finger_radius;         /* m, of a soft finger */
+  double max_force;             /* N at the device */
+  double max_torque;            /* N m at the device */
+  double radius;                /* m */
+  const double *hull_xyz;       /* copied by hap_pointer_set */
+  size_t hull_points;           /* 4..64; 0 with NULL: a sphere */
+  uint32_t collide_bits;        /* geoms that are touched */
+  hap_coupling coupling;        /* this and the next: as in hap_pointer_expert_def */
+  double coupling_stiffness;    /* N/m, of the spring to the device */
+  double coupling_damping;      /* N s/m, likewise */
 } hap_pointer_settings;
 
 /* [any] Fills *settings with the defaults of hap_pointer_def and an empty mask. size_of_settings:

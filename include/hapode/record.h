@@ -161,11 +161,11 @@ typedef struct hap_play_difference {
   /* hap_difference, POINTER or BODY: where it showed first as a value. 0: nowhere yet, and the
    * fields below are not filled in. */
   uint32_t shown;
-  uint32_t traced; /* BODY: place among hap_session_trace_bodies; UINT32_MAX: none of them */
-  uint64_t shown_number;
-  uint64_t shown_tick;
-  double recorded[7]; /* POINTER: force and torque at the device; BODY: position, quaternion */
-  double replayed[7];
+  uint32_t traced;       /* BODY: place among hap_session_trace_bodies; UINT32_MAX: none of them */
+  uint64_t shown_number; /* of what showed it */
+  uint64_t shown_tick;   /* count of ticks before it showed */
+  double recorded[7];    /* POINTER: force and torque at the device; BODY: position, quaternion */
+  double replayed[7];    /* the same of the replay */
   double distance;       /* POINTER: N, of the forces; BODY: m, of the positions */
   char text[256];        /* all of it in words */
   uint32_t other_system; /* 1: the C library is not that of the recording (hap_player_info) */

@@ -49,7 +49,7 @@ typedef struct hap_research_def {
   /* model ACCELERANCE, default HAP_PROBE_BY_ACCURACY: SHARED at HAP_ACCURACY_DEFAULT */
   hap_probe probe;
   hap_impulse_pose impulse_pose; /* model IMPULSE, default HAP_IMPULSE_INTERPOLATED */
-  /* LOCKSTEP: ticks from the start of a physics step to the tick that uses its result, 0 ..
+  /* LOCKSTEP: ticks from the start of a physics step to the tick that uses its result, at most
    * haptic_hz / physics_hz. Default HAP_LATENCY_DEFAULT: 1 in models CONTACT and ACCELERANCE,
    * one step in model IMPULSE. Model SINGLE always has 0 */
   int32_t physics_latency_ticks;
@@ -64,8 +64,8 @@ HAP_API void hap_research_def_init(hap_research_def *def, size_t size_of_def);
 typedef enum hap_integration {
   HAP_INTEGRATION_AUTO = 0,     /* midpoint while T^2 a k <= 4, else implicit */
   HAP_INTEGRATION_EXPLICIT = 1, /* eq. 7 with the poses as they are: has a stability limit */
-  HAP_INTEGRATION_IMPLICIT = 2,
-  HAP_INTEGRATION_MIDPOINT = 3 /* keeps energy; rings where T^2 a k > 4 */
+  HAP_INTEGRATION_IMPLICIT = 2, /* stable at any stiffness, and loses energy */
+  HAP_INTEGRATION_MIDPOINT = 3  /* keeps energy; rings where T^2 a k > 4 */
 } hap_integration;
 
 /* Settings of a pointer. It has a size and may grow at its end. */

@@ -27,6 +27,7 @@
 
 HAP_BEGIN_DECLS
 
+/* A world that the library owns. */
 typedef struct hap_scene hap_scene;
 
 #define HAP_SCENE_WORLD UINT32_MAX /* in place of a body: what never moves */
@@ -89,9 +90,9 @@ typedef struct hap_geom_def {
   /* MESH: x y z of each vertex, m; three indices of each triangle, counter-clockwise as seen from
    * outside. A mesh of a body is closed. */
   const double *vertices_xyz;
-  size_t vertex_count; /* 3..16777216 */
-  const uint32_t *triangles;
-  size_t triangle_count; /* 1..16777216 */
+  size_t vertex_count;       /* 3..16777216 */
+  const uint32_t *triangles; /* MESH: indices */
+  size_t triangle_count;     /* 1..16777216 */
   /* FIELD: heights, m, row by row: columns along x, rows along y, both from the lower end. */
   const double *heights;
   uint32_t columns;       /* 2..65536 */
@@ -154,17 +155,17 @@ typedef enum hap_joint_kind {
 
 /* A joint between two bodies as they are. It has a size and may grow at its end. */
 typedef struct hap_joint_def {
-  uint32_t size;   /* set by hap_joint_def_init */
-  uint32_t cookie; /* set by hap_joint_def_init */
-  hap_joint_kind kind;
-  uint32_t body_a;   /* a body */
-  uint32_t body_b;   /* another one, or HAP_SCENE_WORLD (default) */
-  double anchor[3];  /* m, world; not of SLIDER and FIXED */
-  double axis[2][3]; /* world, any length but 0; default z, x */
+  uint32_t size;       /* set by hap_joint_def_init */
+  uint32_t cookie;     /* set by hap_joint_def_init */
+  hap_joint_kind kind; /* default BALL */
+  uint32_t body_a;     /* a body */
+  uint32_t body_b;     /* another one, or HAP_SCENE_WORLD (default) */
+  double anchor[3];    /* m, world; not of SLIDER and FIXED */
+  double axis[2][3];   /* world, any length but 0; default z, x */
   /* rad or m, from where the joint is now; default none: -infinity and infinity. Angles are within
    * -pi and pi. */
   double low[2];
-  double high[2];
+  double high[2];        /* the other end, likewise */
   double motor_speed[2]; /* rad/s or m/s, default 0 */
   double motor_force[2]; /* N m or N, default 0: no motor. With speed 0 it is friction */
   /* HINGE, SLIDER and UNIVERSAL, beside stops and motor. 0..1e9, default 0: a spring (N m/rad, N/m)
@@ -217,17 +218,17 @@ HAP_API hap_status hap_scene_count(const hap_scene *scene, hap_scene_counts *out
 
 /* A geom of a scene. Its size goes with the call; it may grow at its end. */
 typedef struct hap_scene_geom {
-  uint32_t body;   /* HAP_SCENE_WORLD: it never moves */
-  uint32_t shape;  /* hap_shape */
-  hap_pose pose;   /* in the body's frame, or in the world */
-  double edges[3]; /* m; FIELD: along x and y */
-  double radius;   /* m */
-  double length;   /* m */
-  double friction; /* infinity in some built-in scenes */
-  double bounce;
-  float colour_rgba[4];
-  uint32_t vertex_count; /* MESH, FIELD: for hap_scene_mesh */
-  uint32_t triangle_count;
+  uint32_t body;           /* HAP_SCENE_WORLD: it never moves */
+  uint32_t shape;          /* hap_shape */
+  hap_pose pose;           /* in the body's frame, or in the world */
+  double edges[3];         /* m; FIELD: along x and y */
+  double radius;           /* m */
+  double length;           /* m */
+  double friction;         /* infinity in some built-in scenes */
+  double bounce;           /* 0..1 */
+  float colour_rgba[4];    /* 0..1 */
+  uint32_t vertex_count;   /* MESH, FIELD: for hap_scene_mesh */
+  uint32_t triangle_count; /* MESH, FIELD: likewise */
 } hap_scene_geom;
 
 /* [scene] size_of_out: sizeof *out of the caller's build. HAP_ERROR_NOT_FOUND: there is none of
@@ -260,8 +261,8 @@ HAP_API hap_status hap_scene_get_body(const hap_scene *scene, uint32_t body, hap
 
 /* A joint of a scene, as the world has it. Its size goes with the call; it may grow at its end. */
 typedef struct hap_scene_joint {
-  uint32_t kind; /* hap_joint_kind */
-  uint32_t body_a;
+  uint32_t kind;      /* hap_joint_kind */
+  uint32_t body_a;    /* a body */
   uint32_t body_b;    /* or HAP_SCENE_WORLD */
   uint32_t axes;      /* 0..2 that it has */
   double anchor[3];   /* m, world; of SLIDER, FIXED and OTHER the centre of body a */

@@ -21,6 +21,7 @@
 
 HAP_BEGIN_DECLS
 
+/* One world, coupled to its pointers. */
 typedef struct hap_session hap_session;
 
 /* Who moves time. Values are never renumbered. */

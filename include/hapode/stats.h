@@ -48,24 +48,24 @@ typedef struct hap_loop_stats {
   uint64_t missed_ticks;  /* deadlines t0 + jT with no tick begun before t0 + (j+1)T */
   uint64_t contact_ticks; /* ticks in which a pointer was pushed back */
   double tick_us_mean;    /* us, the whole cycle with device input and output */
-  double tick_us_p50;
-  double tick_us_p99;
-  double tick_us_max;
-  double duty; /* mean tick time / T */
+  double tick_us_p50;     /* us, half of the ticks take at most this */
+  double tick_us_p99;     /* us, 99 of 100 */
+  double tick_us_max;     /* us, the longest tick */
+  double duty;            /* mean tick time / T */
 
   /* How late the system woke the haptic thread for a tick. 0 in drive LOCKSTEP, and where a device
    * sets the pace. */
   double wake_us_mean;
-  double wake_us_p50;
-  double wake_us_p99;
-  double wake_us_p999;
-  double wake_us_max;
+  double wake_us_p50;  /* us, half of the ticks */
+  double wake_us_p99;  /* us, 99 of 100 */
+  double wake_us_p999; /* us, 999 of 1000 */
+  double wake_us_max;  /* us, the latest */
 
-  double model_age_s; /* now - time for which the newest adopted local model was built */
-  double model_age_max_s;
-  uint64_t models_adopted;
-  uint64_t trace_dropped; /* trace rows that found no room */
-  uint64_t trace_hash;    /* LOCKSTEP: of the states and forces of all ticks; 0 otherwise */
+  double model_age_s;      /* now - time for which the newest adopted local model was built */
+  double model_age_max_s;  /* s, the largest so far */
+  uint64_t models_adopted; /* local models that the loop took over */
+  uint64_t trace_dropped;  /* trace rows that found no room */
+  uint64_t trace_hash;     /* LOCKSTEP: of the states and forces of all ticks; 0 otherwise */
 } hap_loop_stats;
 
 /* The hands. The momentum audit compares what the hands gave to dynamic bodies, before the limits
@@ -98,12 +98,12 @@ typedef struct hap_physics_stats {
   uint64_t frames_dropped;  /* FRAME: steps dropped by hap_session_update */
   uint64_t quickstep_calls; /* dWorldQuickStep, global and testing */
   double ms_mean;           /* ms a cycle, all of its parts */
-  double ms_p99;
-  double ms_max;
-  double duty;          /* mean cycle time / H */
-  double pose_delay_s;  /* how far behind hap_session_poses draws */
-  hap_cycle_times mean; /* over all cycles */
-  hap_cycle_times last; /* the newest cycle alone */
+  double ms_p99;            /* ms, 99 of 100 cycles take at most this */
+  double ms_max;            /* ms, the longest cycle */
+  double duty;              /* mean cycle time / H */
+  double pose_delay_s;      /* how far behind hap_session_poses draws */
+  hap_cycle_times mean;     /* over all cycles */
+  hap_cycle_times last;     /* the newest cycle alone */
 } hap_physics_stats;
 
 /* The local model: the part of the world that the loop has. */
@@ -111,7 +111,7 @@ typedef struct hap_model_stats {
   uint64_t capacity_dropped; /* bodies, contacts or cross accelerances that found no room */
   uint32_t bodies_known;     /* to the session */
   uint32_t neighbours;       /* dynamic bodies near a pointer, in the newest model */
-  uint32_t neighbours_max;
+  uint32_t neighbours_max;   /* the most so far */
   uint32_t pointer_contacts; /* pairs of pointer and geom in the newest model */
 
   /* Model CONTACT, in the newest model. */
@@ -137,9 +137,9 @@ typedef struct hap_probe_stats {
 
 /* Model CONTACT: contacts between bodies, and the solver of the loop. */
 typedef struct hap_contact_stats {
-  uint64_t passes; /* sets of contacts that the loop took */
-  double us_mean;  /* us a pass */
-  double us_max;
+  uint64_t passes;     /* sets of contacts that the loop took */
+  double us_mean;      /* us a pass */
+  double us_max;       /* us, the longest pass */
   uint64_t sweeps;     /* of the solver, sum over ticks */
   double residual_max; /* m/s, largest correction of a velocity that was left undone */
   uint32_t points;     /* contact points between bodies that push in the newest tick */
@@ -208,19 +208,19 @@ typedef struct hap_event_stats {
 
 /* All of it. */
 typedef struct hap_stats {
-  uint32_t size; /* bytes filled in */
-  hap_loop_stats loop;
-  hap_hand_stats hand;
-  hap_physics_stats physics;
-  hap_model_stats model;
-  hap_probe_stats probes;
-  hap_contact_stats contact;
-  hap_fault_stats faults;
-  hap_edit_stats edits;
-  hap_error_stats error;
-  hap_safety_stats safety;
-  hap_room_stats room;
-  hap_event_stats events;
+  uint32_t size;             /* bytes filled in */
+  hap_loop_stats loop;       /* the haptic loop */
+  hap_hand_stats hand;       /* the hands */
+  hap_physics_stats physics; /* physics */
+  hap_model_stats model;     /* the local model */
+  hap_probe_stats probes;    /* testing simulations */
+  hap_contact_stats contact; /* contact passes */
+  hap_fault_stats faults;    /* faults and the guard */
+  hap_edit_stats edits;      /* the world between threads */
+  hap_error_stats error;     /* looking back */
+  hap_safety_stats safety;   /* forces lowered in doubt */
+  hap_room_stats room;       /* what a tick has time for */
+  hap_event_stats events;    /* what is told */
 } hap_stats;
 
 /* [any] Copies the statistics into *out. size_of_out: sizeof *out of the caller's build. Each

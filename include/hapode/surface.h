@@ -28,8 +28,8 @@ typedef struct hap_surface {
    * 10. Both come with hap_pointer_def.friction. A static one below the dynamic one is taken as
    * the dynamic one. */
   double friction_static;
-  double friction_dynamic;
-  uint32_t texture; /* of hap_session_add_texture; 0, as it comes: smooth */
+  double friction_dynamic; /* of a touch that slides */
+  uint32_t texture;        /* of hap_session_add_texture; 0, as it comes: smooth */
   /* What the material sounds like to the hand: at a touch with the speed v the hand feels
    * impact_force v exp(-impact_decay t) sin(2 pi impact_hz t) along the normal, beside the
    * contact's force; at most 5 N and 1 W in all. The body does not. It begins in the tick of the
@@ -74,8 +74,8 @@ typedef struct hap_texture_def {
   /* Unit vectors of the geom's frame, at right angles: the way of the columns and that of the rows;
    * default x and y. Along their cross product the height is the same. */
   double along_columns[3];
-  double along_rows[3];
-  double origin[3]; /* m, geom's frame: where the first sample is; default 0 */
+  double along_rows[3]; /* the way of the rows */
+  double origin[3];     /* m, geom's frame: where the first sample is; default 0 */
 
   hap_height_fn height; /* without heights; default NULL */
   void *arg;            /* handed to it; the caller's, until the session is destroyed */
@@ -102,7 +102,7 @@ typedef struct hap_texture_state {
   uint64_t ticks;      /* that called it */
   uint64_t late_ticks; /* those in which it took longer than call_most_s */
   double us_mean;      /* us, of all calls of a tick */
-  double us_max;
+  double us_max;       /* us, the longest tick's calls */
 } hap_texture_state;
 
 /* [any] State of a texture. size_of_out: sizeof *out of the caller's build. HAP_END: its function

@@ -50,14 +50,14 @@ HAP_API hap_status hap_pointer_touches(hap_session *session, hap_pointer_id poin
 /* Two geoms of bodies near the hand that press on each other. Its size goes with the call; it may
  * grow at its end. */
 typedef struct hap_body_contact {
-  void *geom_a; /* dGeomID */
-  void *geom_b;
-  void *body_a; /* dBodyID; NULL: a geom without one */
-  void *body_b;
+  void *geom_a;     /* dGeomID */
+  void *geom_b;     /* dGeomID */
+  void *body_a;     /* dBodyID; NULL: a geom without one */
+  void *body_b;     /* likewise */
   double point[3];  /* m, world: middle of the points that press, by their force */
   double normal[3]; /* unit, world, from b to a */
   double force[3];  /* N, world, on a: with friction */
-  uint32_t points;
+  uint32_t points;  /* points that press */
   uint32_t reserved;
 } hap_body_contact;
 
@@ -107,9 +107,9 @@ typedef struct hap_event {
   int64_t time_ns;        /* of the tick, on the clock of hap_session_now */
   hap_pointer_id pointer; /* FAULT: v is 0 where it came from none; TEXTURE_OUT: 0 */
   void *geom;             /* as in hap_touch; NULL for BUTTON and all kinds behind it */
-  void *body;
-  double point[3];  /* m, world; HOLD, LET_GO: of the pointer */
-  double normal[3]; /* unit, world, out of the geom */
+  void *body;             /* as in hap_touch */
+  double point[3];        /* m, world; HOLD, LET_GO: of the pointer */
+  double normal[3];       /* unit, world, out of the geom */
   /* m/s. TOUCH, IMPACT: at which they closed; SLIDE: along the surface. GRIPPER: rate of its axis,
    * in the unit of the axis a second */
   double speed;

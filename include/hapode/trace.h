@@ -17,8 +17,8 @@
 HAP_BEGIN_DECLS
 
 /* Pointers and bodies of a trace row; further ones are not traced. */
-#define HAP_TRACE_POINTERS_MAX 16
-#define HAP_TRACE_BODIES_MAX 16
+#define HAP_TRACE_POINTERS_MAX 16 /* pointers in a trace row */
+#define HAP_TRACE_BODIES_MAX 16   /* bodies in a trace row */
 
 /* A pointer in a trace row. Final. */
 typedef struct hap_trace_pointer {
@@ -37,8 +37,8 @@ typedef struct hap_trace_row {
   uint32_t contacts;      /* contacts that push */
   uint32_t pointer_count; /* places in use: up to the last pointer */
   uint32_t body_count;    /* traced: hap_session_trace_bodies of ode.h, hap_scene_session */
-  hap_trace_pointer pointers[HAP_TRACE_POINTERS_MAX];
-  double body_position[HAP_TRACE_BODIES_MAX][3]; /* m: the loop's where the body is local,
+  hap_trace_pointer pointers[HAP_TRACE_POINTERS_MAX]; /* as many as pointer_count says */
+  double body_position[HAP_TRACE_BODIES_MAX][3];      /* m: the loop's where the body is local,
                                                     otherwise of the newest physics step */
 } hap_trace_row;
 
@@ -56,16 +56,16 @@ HAP_API hap_status hap_session_trace_read(hap_session *session, hap_trace_row *r
 /* One tick of one pointer, in the device's frame. Its size goes with the call; it may grow at its
  * end. */
 typedef struct hap_black_box_row {
-  uint64_t tick;   /* number, from the first of the session */
-  int64_t time_ns; /* of the session */
-  hap_pointer_id pointer;
-  uint32_t fault;     /* hap_fault latched at the end of the tick */
-  uint32_t guard;     /* hap_guard_flag bits */
-  hap_pose pose;      /* as the device gave it: not finite, where that was the fault */
-  hap_twist twist;    /* likewise */
-  hap_wrench wanted;  /* what the simulation asked for; may be not finite */
-  hap_wrench written; /* what the device was given */
-  double model_age_s; /* s, now - time for which the local model was built */
+  uint64_t tick;          /* number, from the first of the session */
+  int64_t time_ns;        /* of the session */
+  hap_pointer_id pointer; /* whose row it is */
+  uint32_t fault;         /* hap_fault latched at the end of the tick */
+  uint32_t guard;         /* hap_guard_flag bits */
+  hap_pose pose;          /* as the device gave it: not finite, where that was the fault */
+  hap_twist twist;        /* likewise */
+  hap_wrench wanted;      /* what the simulation asked for; may be not finite */
+  hap_wrench written;     /* what the device was given */
+  double model_age_s;     /* s, now - time for which the local model was built */
 } hap_black_box_row;
 
 /* [app] The last ticks before the latched fault, and the first one with it: up to
