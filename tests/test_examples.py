@@ -55,6 +55,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "after_a_fault": "docs/faults.md",
     "memory_and_log": "docs/faults.md",
     "plot_a_trace": "docs/programs.md",
+    "servo_loop": "docs/from-chai3d.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -506,6 +507,13 @@ def check_hold_loosely(program):
           "a strong grip lifts the weight", out)
     point(len(said) == 2 and abs(said[1][2] + 3.0) < 0.05 and said[1][1] == 50.0,
           "a weak one gives way at its force", out)
+
+
+def check_servo_loop(program):
+    rows = rows_of(run(program), r"^(call|geom): at ([0-9.]+) mm ([0-9.]+) N$")
+    off = [abs(float(force) - 0.25 * max(40.0 - float(at), 0.0)) for _, at, force in rows]
+    point(len(rows) == 10 and max(off) < 0.003, "an old callback and a geom feel as k times depth",
+          str(rows))
 
 
 def check_check_a_recording(program):

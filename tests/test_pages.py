@@ -107,10 +107,23 @@ def bad_pages_in_code():
                     yield f"{where}: {name} has no heading {heading}"
 
 
-def lost_pages():
-    """Pages that nobody comes to from the README."""
+def bad_names():
+    """Words of a page in the library's own name space that no header has."""
+    headers = "".join(path.read_text(encoding="utf-8")
+                      for path in (root / "include").rglob("*.h"))
+    known = set(re.findall(r"\b(?:hap|HAP)_\w+", headers))
+    for page in pages:
+        if page.name == "CHANGELOG.md" or page.parent.name in ("decisions", "bench"):
+            continue  # they speak of what was, too
+        for name in set(re.findall(r"\b(?:hap|HAP)_\w+", page.read_text(encoding="utf-8"))):
+            if name not in known and not any(word.startswith(name) for word in known):
+                yield f"{page.relative_to(root)}: no header has {name}"
+
+
+def lost_pages(start):
+    """Pages that nobody comes to from there."""
     reached = set()
-    waiting = [root / "README.md"]
+    waiting = [root / start]
     while waiting:
         page = waiting.pop()
         if page in reached:
@@ -200,7 +213,9 @@ point([] if len(pages) > 20 else [f"{len(pages)} found"], "there are pages")
 point(list(bad_links()), "links lead somewhere")
 point(list(bad_paths()), "files that are named are there")
 point(list(bad_pages_in_code()), "pages that the code names are there")
-point(lost_pages(), "every page is reached from the README")
+point(list(bad_names()), "names of the API are there")
+point(lost_pages("README.md"), "every page is reached from the README")
+point(lost_pages("docs/README.md"), "every page is reached from the index")
 ode = ode_flags()
 if ode is None:
     skip("code compiles", "needs pkg-config and ode.pc")

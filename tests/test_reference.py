@@ -117,8 +117,9 @@ def check_html(folder):
     pages = sorted(folder.glob("*.html"))
     point(list(bad_links(folder)), f"links of {len(pages)} pages lead somewhere")
     outside = [f"{page.name}: {source}" for page in pages
-               for source in re.findall(r"<(?:script|link|img)[^>]*(?:src|href)=\"(https?:[^\"]+)\"",
-                                        page.read_text("utf-8", "replace"))]
+               for source in re.findall(
+                   r"<(?:script|link|img)[^>]*(?:src|href)=\"(https?:[^\"]+)\"",
+                   page.read_text("utf-8", "replace"))]
     point(outside, "no page needs the network")
 
 
