@@ -23,6 +23,16 @@ point() {
   echo "$verdict - $name" >> /tmp/points
 }
 apt_get() { apt-get -y -q -o APT::Sandbox::User=root "$@"; }
+tools_alone() { # of those that draw nothing is needed
+  apt_get install --no-install-recommends /debs/libhapode1_*.deb /debs/hapode-tools_*.deb &&
+    ! dpkg-query -W 'libglfw*' 'libepoxy*' 'libgl1*' 'libx11*' 2>/dev/null | grep .
+}
+says_what_is_missing() { hapode-run --shot /tmp/x.png 2>&1 | grep 'apt install hapode-view'; }
+draws() { # with Mesa's driver, which a viewer recommends
+  apt_get install --no-install-recommends libegl1 libgl1-mesa-dri &&
+    hapode-run --scene row10 --lockstep --seconds 1 --shot /tmp/x.png &&
+    head -c 4 /tmp/x.png | grep -a PNG
+}
 runs() { hapode-run --scene row10 --lockstep --seconds 1; }
 felt() { "$1" | grep 'hand feels'; }
 felt_in_python() {
@@ -45,7 +55,7 @@ by_cmake() { # folder, what find_package gets after the name
 static_by_cmake() {
   by_cmake /tmp/static 'COMPONENTS;static' && ! ldd /tmp/static/consumer | grep libhapode
 }
-programs='hapode-run hapode-bench spidar-emulator'
+programs='hapode-run hapode-bench hapode-view spidar-emulator'
 pages() { for p in $programs; do test -s "/usr/share/man/man1/$p.1.gz" || return; done; }
 completes() {
   for p in $programs; do
@@ -58,11 +68,15 @@ rules() {
     test -s /usr/lib/udev/rules.d/60-hapode-forcedimension.rules
 }
 removes() {
-  apt_get purge libhapode1 libhapode-common libhapode-dev hapode-tools python3-hapode
+  apt_get purge libhapode1 libhapode-common libhapode-dev hapode-tools hapode-view \
+    python3-hapode
 }
 nothing_left() { ! find /usr /etc /var/lib/dpkg/info -iname '*hapode*' | grep .; }
+point 'the programs install without anything that draws' tools_alone
+point 'without the viewer hapode-run says what to install' says_what_is_missing
 point 'installs' apt_get install --no-install-recommends /debs/*.deb
 point 'hapode-run pushes a row of cubes' runs
+point 'hapode-run draws, by hapode-view' draws
 point 'rules of udev' rules
 point 'pages of the manual' pages
 point 'completion' completes

@@ -17,6 +17,7 @@
 #include "tools/run_black_box.h"
 #include "tools/run_calibrate.h"
 #include "tools/run_doctor.h"
+#include "tools/run_hand_over.h"
 #include "tools/run_identify.h"
 #include "tools/run_list.h"
 #include "tools/run_loop.h"
@@ -443,6 +444,9 @@ int main(int argc, char **argv)
       printf("hapode-run %s\n", hap_version());
       break;
     case RUN_SESSION:
+      if (run_hand_over(&options, argv, &detail) < HAP_OK) {
+        return usage_complain(EXIT_USAGE, detail.text);
+      }
       if (options.check.spec != NULL) {
         return check_device(&options);
       }

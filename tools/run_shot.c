@@ -10,12 +10,9 @@
 
 #include "base/log.h"
 #include "base/regular.h"
-#include "tools/run_summary.h"
-
-#ifdef HAPODE_VIEW
-
 #include "tools/run_frame.h"
 #include "tools/run_scene_file.h"
+#include "tools/run_summary.h"
 
 #define FRAMES_HZ 30.0
 #define FRAMES_CALM 0.92 /* of the framing, from frame to frame */
@@ -223,45 +220,3 @@ void run_shot_drop(run_shot *shot)
     shot_free(shot);
   }
 }
-
-#else /* a build without pictures */
-
-hap_status run_shot_open(const run_options *options, const rig *r, double seconds, size_t pointers,
-                         run_shot **out, hap_detail *detail)
-{
-  (void)r;
-  (void)seconds;
-  (void)pointers;
-  *out = NULL;
-  return options->shot.path == NULL && options->shot.frames == NULL
-             ? HAP_OK
-             : hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
-                         "--shot and --frames: this build draws no pictures (meson option view; "
-                         "Debian: libepoxy-dev libegl-dev libpng-dev)");
-}
-
-void run_shot_add_row(run_shot *shot, const hap_trace_row *row)
-{
-  (void)shot;
-  (void)row;
-}
-
-void run_shot_look(run_shot *shot, double t)
-{
-  (void)shot;
-  (void)t;
-}
-
-hap_status run_shot_close(run_shot *shot, hap_detail *detail)
-{
-  (void)shot;
-  (void)detail;
-  return HAP_OK;
-}
-
-void run_shot_drop(run_shot *shot)
-{
-  (void)shot;
-}
-
-#endif

@@ -18,7 +18,7 @@ _hapode() {
   local program=$1 word=$2 before=$3 words=""
   COMPREPLY=()
   case ${program##*/} in
-    hapode-run)
+    hapode-run | hapode-view)
       case $before in
         --scene) words=$(_hapode_section "$program" scenes) ;;
         --model) words=$(_hapode_section "$program" models) ;;
@@ -41,4 +41,4 @@ _hapode() {
   mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
 }
 
-complete -o filenames -F _hapode hapode-run hapode-bench spidar-emulator
+complete -o filenames -F _hapode hapode-run hapode-view hapode-bench spidar-emulator
