@@ -188,6 +188,21 @@ def a_long_trace_makes_no_object_for_each_row():
 
 
 @test
+def the_first_program_is_short():
+    page = (root / "docs" / "python.md").read_text(encoding="utf-8")
+    lines = re.search(r"```python\n(.*?)```", page, re.S)[1].splitlines()
+    assert len(lines) <= 12 and "import hapode" in lines and "plt.show()" in lines, len(lines)
+
+
+@test
+def the_cost_is_measured():
+    said = subprocess.run([sys.executable, "-m", "hapode.cost"], capture_output=True, text=True,
+                          timeout=120)
+    told = re.findall(r"([0-9.]+) us a", said.stdout)
+    assert len(told) == 2, said.stdout + said.stderr
+
+
+@test
 def a_trace_goes_into_the_array_that_is_given():
     with hapode.Scene.load("row10") as scene, scene.session(drive="lockstep",
                                                             trace_rows=500) as session:
