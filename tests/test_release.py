@@ -17,7 +17,7 @@ points = []
 def point(good, name, note=""):
     points.append(bool(good))
     if note and not good:
-        print("# " + note.strip().replace("\n", "\n# "))
+        print("# " + note.strip()[-3000:].replace("\n", "\n# "))
     print(f"{'ok' if good else 'not ok'} {len(points)} - {name}", flush=True)
 
 
