@@ -15,8 +15,8 @@ root = pathlib.Path(sys.argv[1]).resolve()
 PACKAGES = "libc6-dev,libgcc-12-dev,libode-dev,libccd-dev,zlib1g-dev,libserialport-dev," \
            "libexpat1-dev,libqhull-dev"
 # Solver, contacts, joints, guard, files, devices: what has numbers, bits or threads in it.
-TESTS = ("ball_nearest", "patch", "velocity", "solver_apart", "contact_solver", "joints", "friction",
-         "guard", "snapshot", "scene", "touches", "record_file", "key_file", "exchange",
+TESTS = ("ball_nearest", "patch", "velocity", "solver_apart", "contact_solver", "joints",
+         "friction", "guard", "snapshot", "scene", "touches", "record_file", "key_file", "exchange",
          "spidar_kinematics", "spidar_errors")
 CROSS = """
 [binaries]
