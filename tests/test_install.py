@@ -147,7 +147,7 @@ def missing_docs(stage):
     home = pathlib.Path(stage + prefix, "share", "doc", "hapode")
     source = pathlib.Path(root)
     wanted = [*source.glob("*.md"), *source.glob("docs/**/*.md"), *source.glob("docs/**/*.svg"),
-              *source.glob("examples/*.c")]
+              *source.glob("examples/**/*.[ch]")]
     names = [path.relative_to(source) for path in wanted]
     return "\n".join(str(name) for name in names if not (home / name).is_file())
 
