@@ -15,9 +15,9 @@ root = pathlib.Path(sys.argv[1]).resolve()
 PACKAGES = "libc6-dev,libgcc-12-dev,libode-dev,libccd-dev,zlib1g-dev,libserialport-dev," \
            "libexpat1-dev,libqhull-dev"
 # Solver, contacts, joints, guard, files, devices: what has numbers, bits or threads in it.
-TESTS = ("ball_nearest", "patch", "velocity", "solver_apart", "contact_solver", "joints",
-         "friction", "guard", "snapshot", "scene", "touches", "record_file", "key_file", "exchange",
-         "spidar_kinematics", "spidar_errors")
+TESTS = ("ball_nearest", "velocity", "solver_apart", "contact_solver", "joints", "axes", "guard",
+         "field", "scene", "touches", "lanes", "force_calls", "key_file", "exchange",
+         "spidar_kinematics")
 CROSS = """
 [binaries]
 c = 'aarch64-linux-gnu-gcc'

@@ -5,7 +5,7 @@
 apt-get install -y -q gcc libc6-dev meson ninja-build pkg-config libode-dev libccd-dev zlib1g-dev
 apt-get install -y -q libserialport-dev procps
 #: README.md
-meson setup build -Dtests=disabled && meson install -C build && ldconfig
+meson setup build -Dtests=disabled -Dlibdir=lib && meson install -C build && ldconfig
 #: docs/doctor.md
 hapode-run --doctor || true
 #: docs/spidar.md

@@ -4,7 +4,7 @@
 apt-get install -y -q gcc libc6-dev meson ninja-build pkg-config libode-dev libccd-dev zlib1g-dev
 apt-get install -y -q python3-cffi python3-numpy python3-matplotlib
 #: README.md
-meson setup build -Dtests=disabled && meson install -C build && ldconfig
+meson setup build -Dtests=disabled -Dlibdir=lib && meson install -C build && ldconfig
 meson devenv -C build python3 -m hapode.demo "$PWD/push.png" | grep 'strongest force'
 head -c 4 push.png | grep -a PNG
 # The first program of the page, without a display.

@@ -4,7 +4,7 @@
 apt-get install -y -q gcc libc6-dev meson ninja-build pkg-config libode-dev libccd-dev zlib1g-dev
 apt-get install -y -q libopenxr-dev
 #: README.md
-meson setup build -Dtests=disabled && meson install -C build && ldconfig
+meson setup build -Dtests=disabled -Dlibdir=lib && meson install -C build && ldconfig
 cp examples/touch_a_cube.c .
 #: README.md
 cc touch_a_cube.c $(pkg-config --cflags --libs hapode) -o touch_a_cube

@@ -5,7 +5,7 @@ apt-get install -y -q gcc libc6-dev meson ninja-build pkg-config libode-dev libc
 apt-get install -y -q libexpat1-dev libqhull-dev libglfw3-dev libepoxy-dev libegl-dev libpng-dev
 apt-get install -y -q libgl1-mesa-dri libegl1 xvfb xauth xdotool
 #: README.md
-meson setup build -Dtests=disabled && meson install -C build && ldconfig
+meson setup build -Dtests=disabled -Dlibdir=lib && meson install -C build && ldconfig
 cat > robot.urdf <<'URDF'
 <robot name="lever">
   <link name="base">
