@@ -152,6 +152,16 @@ def missing_docs(stage):
     return "\n".join(str(name) for name in names if not (home / name).is_file())
 
 
+def python_folder(stage):
+    """Where the package of Python is, if that is a place in which Python looks."""
+    places = [str(p.parent.parent)[len(stage):]
+              for p in pathlib.Path(stage).rglob("hapode/__init__.py")]
+    out, problem = run(["/usr/bin/python3", "-c", "import sys; print(*sys.path)"])
+    if problem or not places or prefix not in ("/usr", "/usr/local"):
+        return None
+    return "" if places[0] in out.split() else f"{places[0]} is none of {out}"
+
+
 def main(stage, moved):
     point(run(["meson", "install", "-C", build, "--no-rebuild", "--quiet", "--destdir", stage])[1],
           "installs to DESTDIR")
@@ -164,6 +174,11 @@ def main(stage, moved):
     there = {p.name for p in pathlib.Path(stage + prefix, "include/hapode").glob("*.h")}
     point("\n".join(sorted(headers - there)), "all public headers")
     point(missing_docs(stage), "README, pages and examples")
+    placed = python_folder(stage)
+    if placed is None:
+        skip("Python finds the package", "no package, or another prefix than /usr and /usr/local")
+    else:
+        point(placed, "Python finds the package")
     out, problem = run([stage + prefix + "/bin/hapode-run", "--version"],
                        env=dict(os.environ, LD_LIBRARY_PATH=str(library)))
     point(problem or ("" if out.startswith("hapode") else out), "hapode-run says its version")

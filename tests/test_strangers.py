@@ -61,14 +61,14 @@ def visit(script, tree, folder):
     steps.write_text("export LC_ALL=C DEBIAN_FRONTEND=noninteractive\n"
                      "echo 'APT::Sandbox::User \"root\"; APT::Install-Recommends \"0\";' "
                      "> /etc/apt/apt.conf.d/99visit\n"
-                     "cd /root/hapode\nset -eux\n" + script.read_text("utf-8"), "utf-8")
+                     "cd /srv/hapode\nset -eux\n" + script.read_text("utf-8"), "utf-8")
     begin = time.monotonic()
     with open(log, "w", encoding="utf-8") as said:
         done = subprocess.run(
-            ["mmdebstrap", "--variant=minbase", "--format=null", "--customize-hook=chroot $1 date",
-             f"--customize-hook=copy-in {tree} {steps} /root",
-             "--customize-hook=chroot $1 sh /root/visit.sh && touch $1/root/good",
-             f"--customize-hook=copy-out /root/good {folder}", release(), "/dev/null"],
+            ["mmdebstrap", "--variant=minbase", "--format=null",
+             f"--customize-hook=copy-in {tree} {steps} /srv",
+             "--customize-hook=chroot $1 sh /srv/visit.sh && touch $1/srv/good",
+             f"--customize-hook=copy-out /srv/good {folder}", release(), "/dev/null"],
             stdout=said, stderr=said, check=False, timeout=3000)
     seconds = time.monotonic() - begin
     good = done.returncode == 0 and (folder / "good").exists()
