@@ -92,21 +92,20 @@ def install(build, stage):
     return problem or ("" if list(stage.rglob("hapode.pc")) else "no hapode.pc")
 
 
-def try_build(name, compiler, options, folder):
+def try_build(name, compiler, options, build, stage):
     compiler = next((c for c in (compiler, compiler + "-14") if shutil.which(c)), None)
     if compiler is None:
         skip(name, "needs " + BUILDS[name][0])
         return
-    build = folder / "build"
     ccache = ["ccache"] if shutil.which("ccache") else []
     env = dict(os.environ, CC=" ".join([*ccache, compiler]))
     problem = run(["meson", "setup", build, root, *COMMON, *options], env=env)[1]
     problem = problem or run(["ninja", "-C", build], env=env)[1]
     problem = problem or simulate(build, name) or consume(build, compiler)
-    problem = problem or install(build, folder / "stage")
+    problem = problem or install(build, stage)
     if not problem and name in REFUSED:
         words, reason = REFUSED[name]
-        said = run([build / "hapode-run", *words], cwd=folder)[0]
+        said = run([build / "hapode-run", *words], cwd=stage)[0]
         problem = "" if reason in said else f"{' '.join(words)} said: {said}"
     point(problem, name)
 
@@ -121,8 +120,10 @@ def main():
             return
     for name, (compiler, options) in BUILDS.items():
         if not wanted or name in wanted:
-            with tempfile.TemporaryDirectory() as folder:
-                try_build(name, compiler, options, pathlib.Path(folder))
+            # In the tree, so that ccache knows what was compiled before.
+            with tempfile.TemporaryDirectory(prefix="build-option-", dir=root) as build, \
+                    tempfile.TemporaryDirectory() as stage:
+                try_build(name, compiler, options, pathlib.Path(build), pathlib.Path(stage))
     print(f"1..{count}")
     sys.exit(1 if failed else 0)
 
