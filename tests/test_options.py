@@ -15,7 +15,8 @@ import tempfile
 root = pathlib.Path(sys.argv[1]).resolve()
 wanted = sys.argv[2:]
 # Engines to compare with take long to build against, and change nothing else.
-COMMON = ["-Dbullet=disabled", "-Dmujoco=disabled", "-Dlint=disabled", "-Dtests=disabled"]
+COMMON = ["--buildtype=debugoptimized", "-Dbullet=disabled", "-Dmujoco=disabled", "-Dlint=disabled",
+          "-Dtests=disabled"]
 BUILDS = {  # name: compiler, options
     "gcc": ("gcc", []),
     "clang": ("clang", []),
@@ -23,10 +24,11 @@ BUILDS = {  # name: compiler, options
     "gcc, shared": ("gcc", ["-Ddefault_library=shared"]),
     "clang, static": ("clang", ["-Ddefault_library=static"]),
     "clang, shared": ("clang", ["-Ddefault_library=shared"]),
+    "release": ("gcc", ["--buildtype=release"]),
     "debug": ("gcc", ["--buildtype=debug"]),
     "lanes=plain": ("gcc", ["-Dlanes=plain"]),
     "hardening=off": ("gcc", ["-Dhardening=off"]),
-    "asserts=disabled": ("gcc", ["--buildtype=debugoptimized", "-Dasserts=disabled"]),
+    "asserts=disabled": ("gcc", ["-Dasserts=disabled"]),
 }
 OPTIONS = ("serial", "view", "python", "scene_files", "openxr", "docs", "plots")
 BUILDS |= {f"{name}=disabled": ("gcc", [f"-D{name}=disabled"]) for name in OPTIONS}
