@@ -14,10 +14,10 @@ import tempfile
 root = pathlib.Path(sys.argv[1]).resolve()
 PACKAGES = "libc6-dev,libgcc-12-dev,libode-dev,libccd-dev,zlib1g-dev,libserialport-dev," \
            "libexpat1-dev,libqhull-dev"
-# Solver, contacts, joints, guard, files, devices: what has numbers, bits or threads in it.
-TESTS = ("ball_nearest", "velocity", "solver_apart", "contact_solver", "joints", "axes", "guard",
-         "field", "scene", "touches", "lanes", "force_calls", "key_file", "exchange",
-         "spidar_kinematics")
+# Solver, contacts, joints, guard, files, devices: what has numbers and bits in it. What needs a
+# clock in real time is left out: an emulator is too slow for it on a busy machine.
+TESTS = ("ball_nearest", "velocity", "solver_apart", "contact_solver", "joints", "guard", "field",
+         "scene", "touches", "lanes", "key_file", "exchange", "spidar_kinematics")
 CROSS = """
 [binaries]
 c = 'aarch64-linux-gnu-gcc'
