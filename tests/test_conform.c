@@ -247,7 +247,7 @@ TEST(a_device_that_does_not_open_is_said)
   CHECK(strstr(ran.out, "# module /nowhere/libfoo.so: cannot be opened") != NULL);
   CHECK(strstr(ran.out, "not ok 1 - open\nBail out!") != NULL);
   CHECK(device_check("no_such_device", "") == 1);
-  CHECK(strstr(ran.out, "there are: virtual, replay, spidar, module") != NULL);
+  CHECK(strstr(ran.out, "there are: virtual, replay, spidar, haply,") != NULL);
   CHECK(device_check(folder_module("HAPODE_BROKEN"), "") == 1); /* no name before the path */
 }
 

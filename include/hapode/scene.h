@@ -168,13 +168,12 @@ typedef struct hap_joint_def {
   double high[2];        /* the other end, likewise */
   double motor_speed[2]; /* rad/s or m/s, default 0 */
   double motor_force[2]; /* N m or N, default 0: no motor. With speed 0 it is friction */
-  /* HINGE, SLIDER and UNIVERSAL, beside stops and motor. 0..1e9, default 0: a spring (N m/rad, N/m)
-   * that rests at a position (rad, m, where the joint is now: 0), a damper (N m s/rad, N s/m), and
-   * the inertia of a rotor that turns with the axis alone (kg m^2, kg). */
+  /* HINGE, SLIDER and UNIVERSAL, beside stops and motor: a spring, N m/rad or N/m, 0..1e9, default
+   * 0. */
   double stiffness[2];
-  double rest[2];
-  double damping[2];
-  double inertia[2];
+  double rest[2];    /* rad or m, where the spring rests; where the joint is now: 0, the default */
+  double damping[2]; /* N m s/rad or N s/m, 0..1e9, default 0 */
+  double inertia[2]; /* kg m^2 or kg, of a rotor that turns with the axis alone; default 0 */
 } hap_joint_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

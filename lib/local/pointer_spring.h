@@ -171,14 +171,15 @@ static inline bool hapi_spring_soften(hapi_row *row, const hapi_pointer *pointer
 
 /* An error of the impulses of which e is twice the energy moves a body that answers its hand by a
  * with a speed of sqrt(a e) or less: accelerance is a scalar product of forces (Cauchy and
- * Schwarz). While it has one sign, the force of a spring k drifts by k sqrt(a e) or less. The
- * torque of a tool is a difference of its points' forces: there nothing may stay undone. */
+ * Schwarz). While it has one sign, the force of a spring k drifts by k sqrt(a e) or less. Nothing
+ * may stay undone of a tool, whose torque is a difference of its points' forces, and of a rigid
+ * pointer, which is held to its place by rows. */
 static inline void hapi_spring_note(hapi_rows *rows, const hapi_pointer *pointer, double stiffness,
                                     double a)
 {
   double k = pointer->proxied ? hapi_max(stiffness, pointer->coupling.stiffness) : stiffness;
-  bool tool = pointer->shape.hull != NULL;
-  double force2 = tool ? 0.0 : hapi_v3_dot(pointer->wrench.force, pointer->wrench.force);
+  bool exact = pointer->shape.hull != NULL || pointer->rigid;
+  double force2 = exact ? 0.0 : hapi_v3_dot(pointer->wrench.force, pointer->wrench.force);
   double shows = k * k * a;
   if (shows > 0.0) {
     rows->hand = hapi_min(rows->hand, force2 / shows);

@@ -171,6 +171,10 @@ void hapi_range_note_awake(hapi_nearby *nearby)
   hapi_range *range = &nearby->range;
   const hapi_body_table *table = &nearby->world->bodies;
   range->awake_count = 0;
+  if (nearby->visit_capacity < table->high) { /* no memory for what walks note: any may be awake */
+    range->awake_count = HAPI_RANGE_AWAKE + 1;
+    return;
+  }
   for (uint32_t i = 0; i < table->high && range->awake_count <= HAPI_RANGE_AWAKE; ++i) {
     dBodyID body = table->entries[i].body;
     if (body != NULL && !body_sleeps(body) && nearby->visits[i].ranged_in != range->number) {

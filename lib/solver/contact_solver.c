@@ -21,7 +21,7 @@
 #define VAIN_REST_MOST 256u
 
 /* A direct solve costs about as much as so many sweeps, and is made where they will not do. */
-#define DIRECT_SWEEPS 13
+#define DIRECT_SWEEPS 20
 #define RATE_MOST 0.99 /* of sweeps that lead nowhere */
 
 /* ---- preparation ---- */

@@ -29,7 +29,7 @@
 #define TURN_MAX 0.05     /* rad a substep of the gyroscopic motion */
 #define TURN_SUBSTEPS 100 /* at most, a tick */
 
-#define COARSE_MOST 1e-10 /* J, of a sweep's corrections that stay undone in a tick */
+#define COARSE_MOST 1e-11 /* J, of a sweep's corrections that stay undone in a tick */
 #define COARSE_FADE 0.98  /* a tick */
 
 /* ---- bodies ---- */

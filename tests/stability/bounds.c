@@ -14,7 +14,7 @@
 #include "physics/physics_internal.h"
 #include "session/session_internal.h"
 
-#define LEAST_ENERGY 5e-7 /* J: 0.25 um of a cube's height; solves may leave 0.1 um a tick */
+#define LEAST_ENERGY 1e-7 /* J: 50 nm of a cube's height; solves may leave 0.1 um a tick */
 #define LEAST_DEPTH 1e-7  /* m, of ODE's collider between rounded things */
 
 /* A body as whoever moves it has it, loop or ODE, and as the hand meets it. */
