@@ -15,9 +15,10 @@
 #define DEAR_RUNS 32u
 #define CALM_UPDATES 4000u /* row updates of hapi_solver_sweep_on, and two sweeps */
 
-/* After so many runs, one after the other, whose direct solves led to nothing better they rest, and
- * all of the budget is for sweeps. The rest doubles each time that the next one is in vain as
- * well. */
+/* A direct solve that costs more than this is in vain when it leads to nothing better. After so
+ * many such runs, one after the other, direct solves rest, and all of the budget is for sweeps. The
+ * rest doubles each time that the next one is in vain as well. */
+#define VAIN_COST 4000u /* row updates */
 #define VAIN_RUNS 4u
 #define VAIN_REST 16u
 #define VAIN_REST_MOST 256u
@@ -528,7 +529,7 @@ static void note_vain(hapi_solver *solver, uint32_t dearest)
   if (dearest == 0) {
     return;
   }
-  if (solver->direct_solves > 0) {
+  if (solver->direct_solves > 0 || dearest <= VAIN_COST) {
     solver->vain_runs = 0;
     return;
   }
