@@ -5,6 +5,8 @@
 where each check is good once and bad once. Times are not judged, only what is said of them."""
 import json
 import os
+import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -13,6 +15,8 @@ import tempfile
 KEYS = ["kernel", "rtprio", "memlock", "memory_lock", "latency", "ode", "devices",
         "vendor_libraries", "udev_rules", "groups", "ports", "locale", "governor"]
 RULES = "60-hapode-spidar.rules"
+SOURCE = pathlib.Path(__file__).resolve().parent.parent
+ALL_RULES = {path.name: path.parent.name for path in SOURCE.glob("plugins/*/*.rules")}
 GOVERNOR = "/sys/devices/system/cpu/cpu%d/cpufreq/scaling_governor"
 tests = 0
 failed = 0
@@ -43,7 +47,8 @@ def good_root(root):
     write(root, "/proc/self/limits", limits(95, "unlimited"))
     write(root, "/proc/self/status", "Name:\tx\nUid:\t7\t7\t7\t7\nGroups:\t4 20 46 \n")
     write(root, "/etc/group", "root:x:0:\ndialout:x:20:u\nplugdev:x:46:u\n")
-    write(root, "/etc/udev/rules.d/" + RULES, "")
+    for name in ALL_RULES:
+        write(root, "/etc/udev/rules.d/" + name, "")
     write(root, GOVERNOR % 0, "performance\n")
     os.makedirs(root + "/sys/class/tty/ttyUSB0")
     write(root, "/dev/ttyUSB0", "")
@@ -68,6 +73,7 @@ def run(program, root, *options, **environment):
     env = dict(os.environ, HAPODE_DOCTOR_ROOT=root, LC_ALL="C")
     env.pop("HAPODE_SPIDAR_PORT", None)
     env.update(environment)
+    env = {name: value for name, value in env.items() if value is not None}
     return subprocess.run([program, "--doctor", *options], capture_output=True, text=True, env=env,
                           check=False, timeout=60)
 
@@ -89,6 +95,45 @@ def check_latency(found):
     check(0 <= p50 <= p999, "half of the sleeps are less late than nearly all")
     check(abs(p999 - 200) < 0.1 or late["state"] == state,
           "the state of the latency is that of its figure")
+
+
+def check_rules(program, folder):
+    """Each file of rules that a plugin has is looked for by itself."""
+    for name, device in ALL_RULES.items():
+        root = f"{folder}/without_{device}"
+        good_root(root)
+        os.remove(root + "/etc/udev/rules.d/" + name)
+        for other in set(ALL_RULES) - {name}:  # where udev does not look, beside the right ones
+            write(root, "/usr/local/lib/udev/rules.d/" + other, "")
+        write(root, "/usr/local/lib/libHD.so.3", "")
+        found = findings(program, root, LD_LIBRARY_PATH=None)
+        rules, libraries = found["udev_rules"], found["vendor_libraries"]
+        check(rules["state"] == "warning" and f"{name} is not installed" in rules["text"] and
+              rules["type"] == f"sudo cp plugins/{device}/{name} /etc/udev/rules.d/ && "
+              "sudo udevadm control --reload", f"rules of {device} that are missing")
+        check(all(f"/etc/udev/rules.d/{other}" in rules["text"] and other not in rules["type"]
+                  for other in set(ALL_RULES) - {name}), "the others are there")
+        check("LD_LIBRARY_PATH (not set)" in libraries["text"], "a path that is not set")
+        check(libraries["state"] == "warning" and libraries["type"] == "sudo ldconfig" and
+              "/usr/local/lib/libHD.so.3" in libraries["text"],
+              "a library that ldconfig has not seen")
+
+
+def check_absent_libraries(program, folder):
+    """What the devices' own errors say is what the doctor says: names, and where they were."""
+    root, libs = folder + "/empty", folder + "/no/libraries"
+    good_root(root)
+    os.makedirs(libs)
+    found = findings(program, root, LD_LIBRARY_PATH=libs)["vendor_libraries"]
+    check(f"LD_LIBRARY_PATH ({libs})" in found["text"] and "/etc/ld.so.cache" in found["text"] and
+          re.search(r", /(usr/)?lib(64|/)", found["text"]), "where libraries were looked for")
+    for device in ("forcedimension", "openhaptics"):
+        done = subprocess.run([program, "--scene", "row10", "--device", device], check=False,
+                              capture_output=True, text=True, env=dict(os.environ, LC_ALL="C"),
+                              timeout=60)
+        names = re.search(device + r": no (.*?) in LD_LIBRARY_PATH", done.stderr)
+        check(names and f"{device}: no {names[1]};" in found["text"],
+              f"the names that {device} tries")
 
 
 def check_library(program, folder, root, compiler, source, name, environment):
@@ -118,6 +163,8 @@ def main(program, *compiler):
                            ("groups", "warning"), ("ports", "problem"), ("locale", "warning"),
                            ("governor", "warning")):
             check(found[key]["state"] == state and found[key]["type"], f"{key} is not good")
+        check("/usr/local/lib/udev/rules.d/" + RULES in found["udev_rules"]["type"],
+              "rules where udev does not look are copied from there")
         kernel = found["kernel"]["text"]
         check("\x1b[31m" in kernel and '"version" 6.1\\' in kernel,
               "quotes, backslashes and control bytes come through JSON")
@@ -139,6 +186,8 @@ def main(program, *compiler):
                               {"LD_LIBRARY_PATH": libs})
         check(found is not None and "libdhd.so" in found["vendor_libraries"]["text"],
               "a vendor's library is found")
+        check_rules(program, folder)
+        check_absent_libraries(program, folder)
         comma = folder + "/locales"
         os.makedirs(comma)
         if shutil.which("localedef") and subprocess.run(

@@ -30,11 +30,12 @@ BUILDS = {  # name: compiler, options
     "hardening=off": ("gcc", ["-Dhardening=off"]),
     "asserts=disabled": ("gcc", ["-Dasserts=disabled"]),
 }
-OPTIONS = ("serial", "view", "python", "scene_files", "openxr", "docs", "plots")
+OPTIONS = ("serial", "haply", "view", "python", "scene_files", "openxr", "docs", "plots")
 BUILDS |= {f"{name}=disabled": ("gcc", [f"-D{name}=disabled"]) for name in OPTIONS}
 # What a build without the option says where it is asked for it; where that can be asked.
 REFUSED = {
     "view=disabled": (["--scene", "row10", "--shot", "x.png"], "meson option view"),
+    "haply=disabled": (["--scene", "row10", "--device", "haply"], "built without libwslay"),
     "scene_files=disabled": (["--scene", "x.urdf"], "built without expat"),
     "plots=disabled": (["--scene", "row10", "--lockstep", "--seconds", "0.1", "--plot", "x.svg"],
                        "no picture"),
@@ -100,7 +101,8 @@ def try_build(name, compiler, options, build, stage):
         skip(name, "needs " + BUILDS[name][0])
         return
     ccache = ["ccache"] if shutil.which("ccache") else []
-    env = dict(os.environ, CC=" ".join([*ccache, compiler]))
+    # The builds share most objects. For debuggers alone the folder's name is in them.
+    env = dict(os.environ, CC=" ".join([*ccache, compiler]), CCACHE_NOHASHDIR="1")
     problem = run(["meson", "setup", build, root, *COMMON, *options], env=env)[1]
     problem = problem or run(["ninja", "-C", build], env=env)[1]
     problem = problem or simulate(build, name) or consume(build, compiler)

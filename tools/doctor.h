@@ -19,8 +19,8 @@ typedef enum doctor_state {
 
 typedef struct doctor_check {
   doctor_state state;
-  char text[400];
-  char todo[300]; /* what to type; "": nothing */
+  char text[1000];
+  char todo[400]; /* what to type; "": nothing */
   bool measured;
   double p50_us; /* this and the next: where measured */
   double p999_us;

@@ -4,12 +4,16 @@
 
 #include <dlfcn.h>
 #include <errno.h>
+#include <link.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include <hapode/hapode.h>
+
+#include "plugins/forcedimension/libdhd.h"
+#include "plugins/openhaptics/libhd.h"
 
 void doctor_check_devices(const doctor_place *place, doctor_check *check)
 {
@@ -21,51 +25,171 @@ void doctor_check_devices(const doctor_place *place, doctor_check *check)
   }
 }
 
-/* Loaded and let go of; nothing in them is called by name. */
-void doctor_check_vendors(const doctor_place *place, doctor_check *check)
+/* ---- libraries of makers ---- */
+
+typedef struct maker_library {
+  const char *device;
+  const char *const *names; /* as the device tries them; ends with NULL */
+} maker_library;
+
+static const maker_library maker_libraries[] = {{"forcedimension", hapi_dhd_names},
+                                                {"openhaptics", hapi_hd_names}};
+
+/* The whole path of a library that was loaded. */
+static const char *library_path(void *library, const char *name)
 {
-  static const char *const names[] = {"libdhd.so", "libdhd.so.3", "libHD.so", "libHD.so.3"};
-  (void)place;
-  doctor_say(check, DOCTOR_OK, "vendor libraries:");
-  size_t found = 0;
-  for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
-    void *library = dlopen(names[i], RTLD_LAZY | RTLD_LOCAL);
+  struct link_map *map = NULL;
+  return dlinfo(library, RTLD_DI_LINKMAP, (void *)&map) == 0 && map->l_name[0] == '/' ? map->l_name
+                                                                                      : name;
+}
+
+/* Loaded and let go of; nothing in it is called by name. False: it is not there. */
+static bool library_look(const maker_library *maker, doctor_check *check)
+{
+  for (size_t i = 0; maker->names[i] != NULL; ++i) {
+    void *library = dlopen(maker->names[i], RTLD_LAZY | RTLD_LOCAL);
     const char *why = library == NULL ? dlerror() : NULL;
     if (library != NULL) {
-      doctor_append(check, " ", names[i]);
-      ++found;
+      doctor_append(check, " ", library_path(library, maker->names[i]));
       (void)dlclose(library);
-    } else if (why != NULL && !(strncmp(why, names[i], strlen(names[i])) == 0 &&
-                                strstr(why, "No such file") != NULL)) {
+      return true;
+    }
+    if (why != NULL && !(strncmp(why, maker->names[i], strlen(maker->names[i])) == 0 &&
+                         strstr(why, "No such file") != NULL)) {
       check->state = DOCTOR_WARNING;
       doctor_append(check, " cannot be loaded: ", why);
       doctor_todo(check, "install the vendor's library again, for this processor");
-      ++found;
+      return true;
     }
   }
-  if (found == 0) {
-    doctor_append(check, " ", "none (only their devices need them)");
+  return false;
+}
+
+/* Copied to where the loader would find it after ldconfig. */
+static bool library_is_unseen(const doctor_place *place, const maker_library *maker,
+                              doctor_check *check)
+{
+  char path[4096];
+  for (size_t i = 0; maker->names[i] != NULL; ++i) {
+    snprintf(path, sizeof path, "%s/usr/local/lib/%s", place->root, maker->names[i]);
+    if (access(path, F_OK) == 0) {
+      check->state = DOCTOR_WARNING;
+      doctor_append(check, " /usr/local/lib/", maker->names[i]);
+      doctor_append(check, " is not in the loader's list", "");
+      doctor_todo(check, "sudo ldconfig");
+      return true;
+    }
   }
+  return false;
+}
+
+/* Where the loader looks, in its order. Its list, /etc/ld.so.cache, comes before the folders that
+ * it always knows. */
+static void loader_folders(doctor_check *check)
+{
+  const char *set = getenv("LD_LIBRARY_PATH");
+  void *self = dlopen(NULL, RTLD_LAZY);
+  Dl_serinfo size = {0};
+  doctor_append(check, "; looked in LD_LIBRARY_PATH (",
+                set != NULL && *set != '\0' ? set : "not set");
+  doctor_append(check, "), /etc/ld.so.cache", "");
+  if (self == NULL || dlinfo(self, RTLD_DI_SERINFOSIZE, &size) != 0) {
+    return;
+  }
+  Dl_serinfo *folders = malloc(size.dls_size);
+  if (folders != NULL && dlinfo(self, RTLD_DI_SERINFOSIZE, folders) == 0 &&
+      dlinfo(self, RTLD_DI_SERINFO, folders) == 0) {
+    for (unsigned i = 0; i < folders->dls_cnt; ++i) {
+      if (set == NULL || strstr(set, folders->dls_serpath[i].dls_name) == NULL) {
+        doctor_append(check, ", ", folders->dls_serpath[i].dls_name);
+      }
+    }
+  }
+  free(folders);
+  (void)dlclose(self);
+}
+
+void doctor_check_vendors(const doctor_place *place, doctor_check *check)
+{
+  const size_t count = sizeof maker_libraries / sizeof maker_libraries[0];
+  size_t absent = 0;
+  doctor_say(check, DOCTOR_OK, "%s", "");
+  for (size_t m = 0; m < count; ++m) {
+    const maker_library *maker = &maker_libraries[m];
+    doctor_append(check, m > 0 ? "; " : "", maker->device);
+    doctor_append(check, ":", "");
+    if (library_look(maker, check) || library_is_unseen(place, maker, check)) {
+      continue;
+    }
+    ++absent;
+    for (size_t i = 0; maker->names[i] != NULL; ++i) {
+      doctor_append(check, i > 0 ? ", " : " no ", maker->names[i]);
+    }
+  }
+  if (absent > 0) {
+    loader_folders(check);
+    doctor_append(check, "; only these devices need them", "");
+  }
+}
+
+/* ---- rules of udev ---- */
+
+static const struct {
+  const char *device; /* also the folder in plugins */
+  const char *file;
+} device_rules[] = {{"spidar", "60-hapode-spidar.rules"},
+                    {"forcedimension", "60-hapode-forcedimension.rules"}};
+
+static bool rules_are_in(const doctor_place *place, const char *folder, const char *file)
+{
+  char path[4096];
+  snprintf(path, sizeof path, "%s%s/%s", place->root, folder, file);
+  return access(path, F_OK) == 0;
+}
+
+/* The folder of a file of rules among those that udev reads; NULL: none. */
+static const char *rules_folder(const doctor_place *place, const char *file)
+{
+  static const char *const folders[] = {"/etc/udev/rules.d", "/run/udev/rules.d",
+                                        "/usr/lib/udev/rules.d", "/lib/udev/rules.d"};
+  for (size_t i = 0; i < sizeof folders / sizeof folders[0]; ++i) {
+    if (rules_are_in(place, folders[i], file)) {
+      return folders[i];
+    }
+  }
+  return NULL;
 }
 
 void doctor_check_rules(const doctor_place *place, doctor_check *check)
 {
-  static const char *const folders[] = {"/etc/udev/rules.d", "/usr/lib/udev/rules.d",
-                                        "/lib/udev/rules.d", "/usr/local/lib/udev/rules.d"};
-  char path[4096];
-  for (size_t i = 0; i < 3; ++i) {
-    snprintf(path, sizeof path, "%s%s/60-hapode-spidar.rules", place->root, folders[i]);
-    if (access(path, F_OK) == 0) {
-      doctor_say(check, DOCTOR_OK, "%s/60-hapode-spidar.rules", folders[i]);
-      return;
+  static const char unread[] = "/usr/local/lib/udev/rules.d";
+  doctor_say(check, DOCTOR_OK, "%s", "");
+  for (size_t i = 0; i < sizeof device_rules / sizeof device_rules[0]; ++i) {
+    const char *file = device_rules[i].file;
+    const char *folder = rules_folder(place, file);
+    const bool astray = folder == NULL && rules_are_in(place, unread, file);
+    if (i > 0) {
+      doctor_append(check, "; ", "");
     }
+    if (folder != NULL) {
+      doctor_append(check, folder, "/");
+      doctor_append(check, file, "");
+      continue;
+    }
+    doctor_append(check, file, astray ? " is in " : " is not installed");
+    doctor_append(check, astray ? unread : "", astray ? ", where udev does not look" : "");
+    doctor_append(check, ", needed by ", device_rules[i].device);
+    const size_t used = strlen(check->todo);
+    snprintf(check->todo + used, sizeof check->todo - used, "%s%s%s%s/%s",
+             check->state == DOCTOR_OK ? "sudo cp" : "", " ", astray ? unread : "plugins/",
+             astray ? "" : device_rules[i].device, file);
+    check->state = DOCTOR_WARNING;
   }
-  snprintf(path, sizeof path, "%s%s/60-hapode-spidar.rules", place->root, folders[3]);
-  doctor_say(check, DOCTOR_WARNING, "60-hapode-spidar.rules is %s",
-             access(path, F_OK) == 0 ? "where udev does not look" : "not installed");
-  doctor_todo(check,
-              "sudo cp plugins/spidar/60-hapode-spidar.rules /etc/udev/rules.d/ && sudo udevadm "
-              "control --reload");
+  if (check->state != DOCTOR_OK) {
+    const size_t used = strlen(check->todo);
+    snprintf(check->todo + used, sizeof check->todo - used,
+             " /etc/udev/rules.d/ && sudo udevadm control --reload");
+  }
 }
 
 /* Whether the process is in the group of that name. */

@@ -26,14 +26,14 @@ static const hapi_vendor_symbol symbols[] = {
 
 #define SYMBOLS (sizeof symbols / sizeof symbols[0])
 
-static const char *const names[] = {"libdhd.so.3", "libdhd.so", NULL};
+const char *const hapi_dhd_names[] = {"libdhd.so.3", "libdhd.so", NULL};
 
 hap_status hapi_dhd_load(const char *path, void **out_library, hapi_dhd *out, hap_detail *detail)
 {
   static const hapi_vendor vendor = {
       .device = "forcedimension",
       .install = "install the Force Dimension SDK 3 (forcedimension.com) and run ldconfig",
-      .names = names,
+      .names = hapi_dhd_names,
       .symbols = symbols,
       .count = SYMBOLS,
   };

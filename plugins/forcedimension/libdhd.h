@@ -41,6 +41,9 @@ typedef struct hapi_dhd {
   double (*get_rate)(char id);      /* kHz, of the exchange with the hardware */
 } hapi_dhd;
 
+/* Of the shared object, in the order in which they are tried; ends with NULL. */
+extern const char *const hapi_dhd_names[];
+
 /* [control] As hapi_vendor_load. */
 HAP_NODISCARD hap_status hapi_dhd_load(const char *path, void **out_library, hapi_dhd *out,
                                        hap_detail *detail);

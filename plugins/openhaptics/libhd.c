@@ -28,7 +28,7 @@ static const hapi_vendor_symbol symbols[] = {
 
 #define SYMBOLS (sizeof symbols / sizeof symbols[0])
 
-static const char *const names[] = {"libHD.so.3.4", "libHD.so.3", "libHD.so", NULL};
+const char *const hapi_hd_names[] = {"libHD.so.3.4", "libHD.so.3", "libHD.so", NULL};
 
 hap_status hapi_hd_load(const char *path, void **out_library, hapi_hd *out, hap_detail *detail)
 {
@@ -37,7 +37,7 @@ hap_status hapi_hd_load(const char *path, void **out_library, hapi_hd *out, hap_
       .install =
           "install OpenHaptics 3 and the Touch device driver (3dsystems.com), then run "
           "Touch_Setup",
-      .names = names,
+      .names = hapi_hd_names,
       .symbols = symbols,
       .count = SYMBOLS,
   };

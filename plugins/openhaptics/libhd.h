@@ -74,6 +74,9 @@ typedef struct hapi_hd {
   unsigned int (*check_calibration)(void); /* NULL where the library does not have it */
 } hapi_hd;
 
+/* Of the shared object, in the order in which they are tried; ends with NULL. */
+extern const char *const hapi_hd_names[];
+
 /* [control] As hapi_vendor_load. */
 HAP_NODISCARD hap_status hapi_hd_load(const char *path, void **out_library, hapi_hd *out,
                                       hap_detail *detail);
