@@ -7,15 +7,16 @@
 #include <string.h>
 
 #include "base/vec.h"
+#include "tests/oracle_model.h"
 
 #ifdef HAPODE_ORACLE
 #include <mujoco/mujoco.h>
+#endif
 
 #define NEAR 1e-6
 
 typedef struct comparing {
-  const mjModel *theirs;
-  const mjData *data;
+  const oracle_model *theirs;
   bool by_names;
   oracle_found *out;
 } comparing;
@@ -30,7 +31,7 @@ static void number_differs(const comparing *c, const char *what, const char *of,
 }
 
 static void vectors_compare(const comparing *c, const char *what, const char *of,
-                            const double *ours, const mjtNum *theirs, int count)
+                            const double *ours, const double *theirs, int count)
 {
   double largest = 0.0;
   for (int k = 0; k < count; ++k) {
@@ -53,7 +54,7 @@ static void flags_compare(const comparing *c, const char *what, const char *of, 
 
 /* Of two signs the one that fits. */
 static void turn_compare(const comparing *c, const char *what, const char *of, const double *ours,
-                         const mjtNum *theirs)
+                         const double *theirs)
 {
   double dot = 0.0;
   double flipped[4];
@@ -68,37 +69,37 @@ static void turn_compare(const comparing *c, const char *what, const char *of, c
 
 static void mass_compare(const comparing *c, const import_body *body, int i)
 {
-  const mjModel *theirs = c->theirs;
-  mjtNum r[9];
+  const oracle_bodies *bodies = &c->theirs->bodies;
+  double r[9];
   double inertia[9];
-  const mjtNum *d = theirs->body_inertia + 3 * i;
+  const double *d = bodies->inertia + 3 * i;
   const double diagonal[9] = {d[0], 0, 0, 0, d[1], 0, 0, 0, d[2]};
-  mju_quat2Mat(r, theirs->body_iquat + 4 * i);
+  hapi_quat_to_matrix(bodies->iquat + 4 * i, r);
   hapi_m3_turn(r, diagonal, inertia);
-  vectors_compare(c, "mass", body->name, &body->mass.mass, theirs->body_mass + i, 1);
+  vectors_compare(c, "mass", body->name, &body->mass.mass, bodies->mass + i, 1);
   const double *m = body->mass.inertia;
   const bool balanced = d[0] == d[1] && d[1] == d[2] && !hapi_m3_is_scalar(m);
   if (body->mass.mass > 0.0 && c->by_names &&
       balanced) { /* by MuJoCo; hapode does so with a note */
     const double trace = m[0] + m[4] + m[8];
-    const mjtNum theirs_trace = d[0] + d[1] + d[2];
+    const double theirs_trace = d[0] + d[1] + d[2];
     vectors_compare(c, "trace of inertia", body->name, &trace, &theirs_trace, 1);
   } else if (body->mass.mass > 0.0) {
-    vectors_compare(c, "centre", body->name, body->mass.centre, theirs->body_ipos + 3 * i, 3);
+    vectors_compare(c, "centre", body->name, body->mass.centre, bodies->ipos + 3 * i, 3);
     vectors_compare(c, "inertia", body->name, body->mass.inertia, inertia, 9);
   }
 }
 
 static void springs_compare(const comparing *c, const import_joint *joint, int j)
 {
-  const mjModel *theirs = c->theirs;
-  const int dof = theirs->jnt_dofadr[j];
-  const mjtNum zero = theirs->qpos0[theirs->jnt_qposadr[j]];
-  const mjtNum rest = theirs->qpos_spring[theirs->jnt_qposadr[j]] - zero;
-  vectors_compare(c, "stiffness", joint->name, &joint->stiffness, theirs->jnt_stiffness + j, 1);
-  vectors_compare(c, "damping", joint->name, &joint->damping, theirs->dof_damping + dof, 1);
-  vectors_compare(c, "armature", joint->name, &joint->armature, theirs->dof_armature + dof, 1);
-  vectors_compare(c, "friction", joint->name, &joint->friction, theirs->dof_frictionloss + dof, 1);
+  const oracle_joints *joints = &c->theirs->joints;
+  const int dof = joints->dof_at[j];
+  const double zero = joints->qpos0[joints->qpos_at[j]];
+  const double rest = joints->qpos_spring[joints->qpos_at[j]] - zero;
+  vectors_compare(c, "stiffness", joint->name, &joint->stiffness, joints->stiffness + j, 1);
+  vectors_compare(c, "damping", joint->name, &joint->damping, joints->damping + dof, 1);
+  vectors_compare(c, "armature", joint->name, &joint->armature, joints->armature + dof, 1);
+  vectors_compare(c, "friction", joint->name, &joint->friction, joints->friction + dof, 1);
   if (joint->stiffness > 0.0 && joint->kind != IMPORT_BALL) {
     vectors_compare(c, "springref", joint->name, &joint->rest, &rest, 1);
   }
@@ -106,85 +107,87 @@ static void springs_compare(const comparing *c, const import_joint *joint, int j
 
 static void joint_compare(const comparing *c, const import_joint *joint, int j)
 {
-  static const int kinds[] = {mjJNT_FREE, mjJNT_BALL, mjJNT_HINGE, mjJNT_SLIDE};
-  const mjModel *theirs = c->theirs;
-  flags_compare(c, "kind of joint", joint->name, kinds[joint->kind], theirs->jnt_type[j]);
-  if (joint->kind == IMPORT_FREE || kinds[joint->kind] != theirs->jnt_type[j]) {
+  static const int kinds[] = {ORACLE_FREE, ORACLE_BALL, ORACLE_HINGE, ORACLE_SLIDE};
+  const oracle_joints *joints = &c->theirs->joints;
+  flags_compare(c, "kind of joint", joint->name, kinds[joint->kind], joints->type[j]);
+  if (joint->kind == IMPORT_FREE || kinds[joint->kind] != joints->type[j]) {
     return;
   }
-  vectors_compare(c, "anchor", joint->name, joint->anchor, theirs->jnt_pos + 3 * j, 3);
+  vectors_compare(c, "anchor", joint->name, joint->anchor, joints->pos + 3 * j, 3);
   springs_compare(c, joint, j);
   if (joint->kind == IMPORT_BALL) {
     return;
   }
-  vectors_compare(c, "axis", joint->name, joint->axis, theirs->jnt_axis + 3 * j, 3);
-  mjtNum zero = theirs->qpos0[theirs->jnt_qposadr[j]];
+  vectors_compare(c, "axis", joint->name, joint->axis, joints->axis + 3 * j, 3);
+  double zero = joints->qpos0[joints->qpos_at[j]];
   const double range[2] = {joint->low + zero, joint->high + zero};
-  bool limited = theirs->jnt_limited[j] != 0;
+  bool limited = joints->limited[j] != 0;
   flags_compare(c, "being limited", joint->name, isfinite(joint->low) != 0, limited);
   if (limited && isfinite(joint->low)) {
-    vectors_compare(c, "range", joint->name, range, theirs->jnt_range + 2 * j, 2);
+    vectors_compare(c, "range", joint->name, range, joints->range + 2 * j, 2);
   }
 }
 
 static void geom_compare(const comparing *c, const import_geom *geom, int g)
 {
-  static const int types[] = {mjGEOM_PLANE, mjGEOM_SPHERE,    mjGEOM_CAPSULE, mjGEOM_CYLINDER,
-                              mjGEOM_BOX,   mjGEOM_ELLIPSOID, mjGEOM_MESH,    mjGEOM_HFIELD};
+  static const int types[] = {ORACLE_PLANE, ORACLE_SPHERE,    ORACLE_CAPSULE, ORACLE_CYLINDER,
+                              ORACLE_BOX,   ORACLE_ELLIPSOID, ORACLE_MESH,    ORACLE_FIELD};
   static const int sizes[] = {0, 1, 2, 2, 3, 3, 0, 0};
-  const mjModel *theirs = c->theirs;
+  const oracle_geoms *geoms = &c->theirs->geoms;
   const char *name = geom->name;
-  flags_compare(c, "shape of geom", name, types[geom->shape], theirs->geom_type[g]);
-  if (types[geom->shape] != theirs->geom_type[g]) {
+  flags_compare(c, "shape of geom", name, types[geom->shape], geoms->type[g]);
+  if (types[geom->shape] != geoms->type[g]) {
     return;
   }
   if (geom->shape != IMPORT_MESH) { /* its frame is put into the centre of mass */
-    vectors_compare(c, "place of geom", name, geom->pose.position, theirs->geom_pos + 3 * g, 3);
-    turn_compare(c, "turn of geom", name, geom->pose.quat_wxyz, theirs->geom_quat + 4 * g);
+    vectors_compare(c, "place of geom", name, geom->pose.position, geoms->pos + 3 * g, 3);
+    turn_compare(c, "turn of geom", name, geom->pose.quat_wxyz, geoms->quat + 4 * g);
   }
-  vectors_compare(c, "size", name, geom->size, theirs->geom_size + 3 * g, sizes[geom->shape]);
+  vectors_compare(c, "size", name, geom->size, geoms->size + 3 * g, sizes[geom->shape]);
   if (c->by_names) { /* URDF has no more of it */
     return;
   }
-  vectors_compare(c, "friction of geom", name, &geom->friction, theirs->geom_friction + 3 * g, 1);
-  flags_compare(c, "contype", name, geom->category_bits, (uint32_t)theirs->geom_contype[g]);
-  flags_compare(c, "conaffinity", name, geom->collide_bits, (uint32_t)theirs->geom_conaffinity[g]);
-  static const float grey[4] = {0.5F, 0.5F, 0.5F, 1.0F};
-  const bool is_default = memcmp(theirs->geom_rgba + 4 * (ptrdiff_t)g, grey, sizeof grey) == 0;
+  vectors_compare(c, "friction of geom", name, &geom->friction, geoms->friction + 3 * g, 1);
+  flags_compare(c, "contype", name, geom->category_bits, (uint32_t)geoms->contype[g]);
+  flags_compare(c, "conaffinity", name, geom->collide_bits, (uint32_t)geoms->conaffinity[g]);
+  static const double grey[4] = {0.5, 0.5, 0.5, 1.0};
+  const bool is_default = memcmp(geoms->rgba + 4 * (ptrdiff_t)g, grey, sizeof grey) == 0;
   for (int k = 0; k < 4; ++k) {
-    const int material = theirs->geom_matid[g];
-    const float *rgba = material < 0 || !is_default ? theirs->geom_rgba + 4 * (ptrdiff_t)g
-                                                    : theirs->mat_rgba + 4 * (ptrdiff_t)material;
-    if (!(fabsf(geom->colour_rgba[k] - rgba[k]) < 1e-6F)) {
-      number_differs(c, "colour", name, (double)geom->colour_rgba[k], (double)rgba[k]);
+    const int material = geoms->material[g];
+    const double *rgba = material < 0 || !is_default
+                             ? geoms->rgba + 4 * (ptrdiff_t)g
+                             : geoms->material_rgba + 4 * (ptrdiff_t)material;
+    const double colour = (double)geom->colour_rgba[k];
+    if (!(fabs(colour - rgba[k]) < NEAR)) {
+      number_differs(c, "colour", name, colour, rgba[k]);
     }
   }
 }
 
 static void field_compare(const comparing *c, const import_geom *geom, int g)
 {
-  const mjModel *theirs = c->theirs;
-  const int f = theirs->geom_dataid[g];
-  const int rows = theirs->hfield_nrow[f];
-  const int columns = theirs->hfield_ncol[f];
+  const oracle_geoms *geoms = &c->theirs->geoms;
+  const int f = geoms->data[g];
+  const int rows = geoms->field_rows[f];
+  const int columns = geoms->field_columns[f];
   flags_compare(c, "rows of field", geom->name, geom->field->rows, rows);
   flags_compare(c, "columns of field", geom->name, geom->field->columns, columns);
   for (int i = 0; i < rows * columns && c->out->differ == 0; ++i) {
-    const double height = (double)theirs->hfield_data[theirs->hfield_adr[f] + i] *
-                          theirs->hfield_size[4 * (ptrdiff_t)f + 2];
+    const double height =
+        geoms->field_data[geoms->field_at[f] + i] * geoms->field_size[4 * (ptrdiff_t)f + 2];
     vectors_compare(c, "height of field", geom->name, geom->field->heights + i, &height, 1);
   }
 }
 
 static void body_compare(const comparing *c, const import_body *body, int i)
 {
-  const mjModel *theirs = c->theirs;
-  int j = theirs->body_jntadr[i];
-  int g = theirs->body_geomadr[i];
-  const int last_joint = j + theirs->body_jntnum[i];
-  const int last_geom = g + theirs->body_geomnum[i];
-  vectors_compare(c, "place", body->name, body->pose_world.position, c->data->xpos + 3 * i, 3);
-  turn_compare(c, "turn", body->name, body->pose_world.quat_wxyz, c->data->xquat + 4 * i);
+  const oracle_bodies *bodies = &c->theirs->bodies;
+  int j = bodies->joint_at[i];
+  int g = bodies->geom_at[i];
+  const int last_joint = j + bodies->joint_count[i];
+  const int last_geom = g + bodies->geom_count[i];
+  vectors_compare(c, "place", body->name, body->pose_world.position, bodies->xpos + 3 * i, 3);
+  turn_compare(c, "turn", body->name, body->pose_world.quat_wxyz, bodies->xquat + 4 * i);
   if (body->parent != NULL) {
     mass_compare(c, body, i);
   }
@@ -204,7 +207,7 @@ static void body_compare(const comparing *c, const import_body *body, int i)
       break;
     }
     geom_compare(c, geom, g);
-    if (geom->shape == IMPORT_FIELD && theirs->geom_type[g] == mjGEOM_HFIELD) {
+    if (geom->shape == IMPORT_FIELD && c->theirs->geoms.type[g] == ORACLE_FIELD) {
       field_compare(c, geom, g);
     }
   }
@@ -213,28 +216,61 @@ static void body_compare(const comparing *c, const import_body *body, int i)
   }
 }
 
+/* -1: none. */
+static int body_find(const oracle_bodies *bodies, const char *name)
+{
+  int i = bodies->count - 1;
+  while (i >= 0 && strcmp(bodies->names[i], name) != 0) {
+    --i;
+  }
+  return i;
+}
+
 static void model_compare(const comparing *c, const import_model *ours)
 {
-  static const mjtNum none[3] = {0.0, 0.0, 0.0};
+  const oracle_bodies *bodies = &c->theirs->bodies;
   int count = 0;
-  const bool weightless = (c->theirs->opt.disableflags & mjDSBL_GRAVITY) != 0;
-  vectors_compare(c, "gravity", ours->name, ours->gravity,
-                  weightless ? none : c->theirs->opt.gravity, 3);
+  vectors_compare(c, "gravity", ours->name, ours->gravity, c->theirs->gravity, 3);
   for (const import_body *body = ours->bodies; body != NULL; body = body->next) {
     if (c->by_names && count > 0 && strcmp(body->name, "world") == 0) {
       continue; /* MuJoCo takes a root of that name for its own */
     }
-    const int i =
-        !c->by_names || count == 0 ? count : mj_name2id(c->theirs, mjOBJ_BODY, body->name);
-    if (i < 0 || i >= c->theirs->nbody) {
-      number_differs(c, "number of bodies", body->name, 1 + count, c->theirs->nbody);
+    const int i = !c->by_names || count == 0 ? count : body_find(bodies, body->name);
+    if (i < 0 || i >= bodies->count) {
+      number_differs(c, "number of bodies", body->name, 1 + count, bodies->count);
       return;
     }
     body_compare(c, body, i);
     ++count;
   }
-  flags_compare(c, "number of bodies", ours->name, count, c->theirs->nbody);
+  flags_compare(c, "number of bodies", ours->name, count, bodies->count);
 }
+
+bool scene_oracle_is_there(void)
+{
+  return oracle_node_is_there() || oracle_library_is_there();
+}
+
+bool scene_oracle(const char *path, const import_model *ours, oracle_found *out)
+{
+  oracle_model theirs;
+  memset(out, 0, sizeof *out);
+  const char *end = strrchr(path, '.');
+  const bool is_there = oracle_node_is_there()
+                            ? oracle_node_read(path, &theirs, out->first, sizeof out->first)
+                            : oracle_library_read(path, &theirs, out->first, sizeof out->first);
+  if (!is_there) {
+    return false;
+  }
+  out->first[0] = '\0'; /* a warning */
+  const bool urdf = ours->bodies->next != NULL && strcmp(ours->bodies->name, "") == 0;
+  const comparing c = {&theirs, urdf || (end != NULL && strcmp(end, ".urdf") == 0), out};
+  model_compare(&c, ours);
+  oracle_model_free(&theirs);
+  return true;
+}
+
+#ifdef HAPODE_ORACLE
 
 bool scene_oracle_move(const char *path, double seconds, size_t body, double out_position[3])
 {
@@ -257,46 +293,11 @@ bool scene_oracle_move(const char *path, double seconds, size_t body, double out
   return true;
 }
 
-bool scene_oracle_is_there(void)
-{
-  return true;
-}
-
-bool scene_oracle(const char *path, const import_model *ours, oracle_found *out)
-{
-  memset(out, 0, sizeof *out);
-  const char *end = strrchr(path, '.');
-  mjModel *theirs = mj_loadXML(path, NULL, out->first, (int)sizeof out->first);
-  if (theirs == NULL) {
-    return false;
-  }
-  out->first[0] = '\0'; /* a warning */
-  mjData *data = mj_makeData(theirs);
-  mj_kinematics(theirs, data);
-  const bool urdf = ours->bodies->next != NULL && strcmp(ours->bodies->name, "") == 0;
-  const comparing c = {theirs, data, urdf || (end != NULL && strcmp(end, ".urdf") == 0), out};
-  model_compare(&c, ours);
-  mj_deleteData(data);
-  mj_deleteModel(theirs);
-  return true;
-}
-
 #else
 
 bool scene_oracle_move(const char *path, double seconds, size_t body, double out_position[3])
 {
   (void)path, (void)seconds, (void)body, (void)out_position;
-  return false;
-}
-
-bool scene_oracle_is_there(void)
-{
-  return false;
-}
-
-bool scene_oracle(const char *path, const import_model *ours, oracle_found *out)
-{
-  (void)path, (void)ours, (void)out;
   return false;
 }
 

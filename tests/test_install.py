@@ -156,10 +156,26 @@ def python_folder(stage):
     """Where the package of Python is, if that is a place in which Python looks."""
     places = [str(p.parent.parent)[len(stage):]
               for p in pathlib.Path(stage).rglob("hapode/__init__.py")]
-    out, problem = run(["/usr/bin/python3", "-c", "import sys; print(*sys.path)"])
+    out, problem = run(["/usr/bin/python3", "-c", "import site; print(*site.getsitepackages())"])
     if problem or not places or prefix not in ("/usr", "/usr/local"):
         return None
     return "" if places[0] in out.split() else f"{places[0]} is none of {out}"
+
+
+def check_python_folders():
+    """By Debian's Python, whatever prefix this build has; as meson names them, with a slash."""
+    python = "/usr/bin/python3"
+    out, problem = run([python, "-c", "import site; print(*site.getsitepackages())"])
+    if problem or "/usr/lib/python3/dist-packages" not in out:
+        skip("the folder of Python's packages below a prefix", "not Debian's Python")
+        return
+    local = next((place for place in out.split() if place.startswith("/usr/local/")), "")
+    for prefix, wanted in {"/usr": "/usr/lib/python3/dist-packages", "/usr/local": local,
+                           "/opt/x": "/opt/x/lib/python3/dist-packages"}.items():
+        out, problem = run([python, "-B", os.path.join(root, "python", "install_dir.py"),
+                            f"{prefix}/lib/python3/dist-packages/", prefix])
+        point(problem or ("" if out.strip() == wanted else out),
+              f"the folder of Python's packages below {prefix}")
 
 
 def main(stage, moved):
@@ -179,6 +195,7 @@ def main(stage, moved):
         skip("Python finds the package", "no package, or another prefix than /usr and /usr/local")
     else:
         point(placed, "Python finds the package")
+    check_python_folders()
     out, problem = run([stage + prefix + "/bin/hapode-run", "--version"],
                        env=dict(os.environ, LD_LIBRARY_PATH=str(library)))
     point(problem or ("" if out.startswith("hapode") else out), "hapode-run says its version")

@@ -12,10 +12,11 @@ hapode-run --doctor || true
 hapode-run --list | grep spidar
 #: docs/spidar.md
 spidar-emulator --link /tmp/spidar &
+emulator=$!
 sleep 2
 #: docs/spidar.md
 hapode-run --scene row10 --seconds 6 --device spidar:/tmp/spidar | grep peak_force
-kill %1 || true # it ends with the run
+kill "$emulator"
 mkdir mine && cp /usr/local/share/hapode/skeleton/* mine && cd mine
 #: docs/writing-a-device.md
 cc -Wall -shared -fPIC $(pkg-config --cflags hapode) skeleton.c toy_hardware.c -lm -o libskeleton.so
