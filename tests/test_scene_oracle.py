@@ -45,8 +45,9 @@ def main(root, cases, files):
                               check=False)
         points += ["# " + line for line in done.stdout.splitlines()]
         equal = done.stdout.count("equal ")
-        read = done.stdout.count("equal ") + done.stdout.count("differs ")
-        points.append(("ok %d" if equal == read > 0 else "not ok %d") + " - public scenes are equal")
+        read = equal + done.stdout.count("differs ")
+        good = equal == read > 0
+        points.append(("ok %d" if good else "not ok %d") + " - public scenes are equal")
     count = 0
     for line in points:
         count += line[0] != "#"
