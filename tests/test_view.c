@@ -460,6 +460,27 @@ TEST(strips_show_what_came_in)
   CHECK_SAY(greens[0] > 100 && greens[1] < greens[0] / 10, "%d %d", greens[0], greens[1]);
 }
 
+/* Where frames come more slowly than bins: the line is drawn through, and so is what is below. */
+TEST(a_strip_of_few_values_has_no_gaps)
+{
+  easel *e = easel_with_box();
+  static view_strips strips;
+  view_strips_init(&strips, 1.0);
+  for (int i = 0; i <= 100; ++i) {
+    view_strips_add(&strips, 0.009999 * i, 5.0, 10.0);
+  }
+  CHECK(strips.force[101] < 0.0F);
+  e->pixels = view_draw(e->view, &e->frame, &strips, NULL);
+  int least = 255;
+  int most = 0;
+  for (int x = 60; x < WIDTH / 2 - 40; ++x) { /* a row near the lower end of the curve's area */
+    const int green = e->pixels[3 * (338 * WIDTH + x) + 1];
+    least = green < least ? green : least;
+    most = green > most ? green : most;
+  }
+  CHECK_SAY(most - least < 8 && least > 60, "%d to %d", least, most);
+}
+
 TEST(text_stands_in_the_corner)
 {
   easel *e = easel_with_box();

@@ -81,6 +81,7 @@ typedef struct strip_plot {
   float now; /* share of the width; < 0: not to be marked */
   const float *values;
   float colour[4];
+  float least; /* to which the scale reaches, however small the values */
   const char *name;
   const char *unit_name;
 } strip_plot;
@@ -93,7 +94,7 @@ static int number_write(char *out, size_t size, double value)
 }
 
 /* The top of a plot: single peaks far above the rest are cut. */
-static float values_top(const float *values, float most)
+static float values_top(const float *values, float most, float least)
 {
   float sum = 0.0F;
   int count = 0;
@@ -101,7 +102,7 @@ static float values_top(const float *values, float most)
     sum += fmaxf(values[i], 0.0F);
     count += values[i] >= 0.0F;
   }
-  return round_up(fmaxf(fminf(most, count > 0 ? 8.0F * sum / (float)count : 0.0F), 1e-3F));
+  return round_up(fmaxf(fminf(most, count > 0 ? 8.0F * sum / (float)count : 0.0F), least));
 }
 
 static float values_most(const float *values)
@@ -113,14 +114,33 @@ static float values_most(const float *values)
   return most;
 }
 
+/* Bins between two values that have none get theirs from the line between them, as it is drawn. */
+static void values_join(const float *values, float out[VIEW_BINS])
+{
+  int last = -1;
+  memcpy(out, values, VIEW_BINS * sizeof out[0]);
+  for (int i = 0; i < VIEW_BINS; ++i) {
+    if (values[i] < 0.0F) {
+      continue;
+    }
+    for (int k = last + 1; last >= 0 && k < i; ++k) {
+      const float share = (float)(k - last) / (float)(i - last);
+      out[k] = values[last] + share * (values[i] - values[last]);
+    }
+    last = i;
+  }
+}
+
 /* Below the curve, a column for each pixel. */
 static void area_fill(ink *io, const strip_plot *p, const float area[4], float top)
 {
   const float fill[4] = {p->colour[0], p->colour[1], p->colour[2], 0.20F};
   const float scale = VIEW_BINS / (area[2] - area[0]);
+  float joined[VIEW_BINS];
+  values_join(p->values, joined);
   for (float x = ceilf(area[0]); x + 1.0F <= area[2]; x += 1.0F) {
     int bin = (int)((x + 0.5F - area[0]) * scale);
-    float value = bin < VIEW_BINS ? p->values[bin] : -1.0F;
+    float value = bin < VIEW_BINS ? joined[bin] : -1.0F;
     float y = area[3] - (area[3] - area[1]) * fminf(value / top, 1.0F);
     if (value > 0.0F) {
       ink_panel(io, (const float[4]){x, y, x + 1.0F, area[3]}, 0.0F, fill);
@@ -153,7 +173,7 @@ static void plot_draw(ink *io, const strip_plot *p)
   const float *b = p->box;
   const float area[4] = {b[0] + 46.0F * u, b[1] + 34.0F * u, b[2] - 14.0F * u, b[3] - 14.0F * u};
   const float most = values_most(p->values);
-  const float top = values_top(p->values, most);
+  const float top = values_top(p->values, most, p->least);
   char text[64];
   ink_panel(io, b, 7.0F * u, ink_panel_colour);
   ink_text(io, (const float[3]){b[0] + 13.0F * u, b[1] + 20.0F * u, 9.5F * u}, INK_LEFT, ink_light,
@@ -202,6 +222,7 @@ void strips_draw(ink *io, const view_strips *strips, double t, const int size[2]
                             .now = now,
                             .values = strips->force,
                             .colour = {0.25F, 0.86F, 0.50F, 1.0F},
+                            .least = 0.1F,
                             .name = "force on the hand",
                             .unit_name = "N"};
   const strip_plot tick = {.box = {middle + 0.5F * gap, top, (float)size[0] - gap, bottom},
@@ -209,6 +230,7 @@ void strips_draw(ink *io, const view_strips *strips, double t, const int size[2]
                            .now = now,
                            .values = strips->tick_us,
                            .colour = {0.98F, 0.72F, 0.30F, 1.0F},
+                           .least = 1.0F,
                            .name = "time of a tick",
                            .unit_name = "\x7fs"};
   plot_draw(io, &force);
