@@ -5,6 +5,7 @@
  * and the keys. HAPODE_RUN: path of the program. */
 
 #include <fcntl.h>
+#include <math.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/wait.h>
@@ -171,6 +172,53 @@ TEST(the_mouse_pulls_the_hand)
   CHECK_NEAR(ends[1][0] - ends[0][0], 40.0 * per_pixel, 3e-3);
   CHECK_NEAR(ends[1][1] - ends[0][1], 0.0, 1e-3);
   CHECK_NEAR(ends[1][2] - ends[0][2], 30.0 * per_pixel, 3e-3);
+}
+
+/* How far the hand comes that a SpaceMouse pushes: the eye looks along y at first. */
+static void spacemouse_push(const char *deflections, double out[3])
+{
+  char arguments[600];
+  char path[300];
+  double ends[2][3];
+  char from[300];
+  (void)snprintf(from, sizeof from, "cp %s %s", getenv("HAPODE_STANDIN_SPNAV"),
+                 folder_path("libspnav.so.0"));
+  REQUIRE(system(from) == 0);
+  setenv("LD_LIBRARY_PATH", test_folder, 1);
+  setenv("STANDIN_SPNAV", deflections, 1);
+  (void)snprintf(path, sizeof path, "%s", folder_path("pushed.csv"));
+  (void)snprintf(arguments, sizeof arguments,
+                 "--view --lockstep --scene row10 --device virtual:path=0:-0.1/0/0.3 "
+                 "--shot-size 400x320 --camera=0,-1,0.3,0,0,0.3 --trace %s",
+                 path);
+  pid_t child = program_start(arguments, NULL);
+  unsetenv("STANDIN_SPNAV");
+  unsetenv("LD_LIBRARY_PATH");
+  window_drive(child, "sleep 2 && xdotool mousemove 200 160 key Escape");
+  ends_of(path, ends);
+  for (int i = 0; i < 3; ++i) {
+    out[i] = ends[1][i] - ends[0][i];
+  }
+}
+
+TEST(a_spacemouse_pushes_the_hand)
+{
+  double way[3];
+  display_open();
+  spacemouse_push("500 350 175 0 0 0 0", way); /* right and half as much up */
+  CHECK_SAY(way[0] > 0.1 && fabs(way[2] - 0.5 * way[0]) < 0.01 && fabs(way[1]) < 1e-3, "%g %g %g",
+            way[0], way[1], way[2]);
+  spacemouse_push("500 0 0 350 0 0 0", way); /* away */
+  CHECK_SAY(way[1] > 0.1 && fabs(way[0]) < 1e-3 && fabs(way[2]) < 1e-3, "%g %g %g", way[0], way[1],
+            way[2]);
+  /* turned counter-clockwise as seen from above: what is right is nearer now */
+  spacemouse_push("400 0 0 0 0 350 0;500 350 0 0 0 0 0", way);
+  CHECK_SAY(way[0] > 0.05 && way[1] < -0.05 && fabs(way[2]) < 1e-3, "%g %g %g", way[0], way[1],
+            way[2]);
+  spacemouse_push("400 0 0 0 350 0 0;500 0 0 350 0 0 0", way); /* the eye rose: away is down, too */
+  CHECK_SAY(way[1] > 0.05 && way[2] < -0.02, "%g %g %g", way[0], way[1], way[2]);
+  spacemouse_push("500 0 0 0 0 0 0", way);
+  CHECK_SAY(fabs(way[0]) + fabs(way[1]) + fabs(way[2]) < 1e-6, "%g", way[0]);
 }
 
 TEST(a_recording_is_looked_at)

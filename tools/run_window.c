@@ -14,6 +14,7 @@
 #include "base/log.h"
 #include "tools/run_frame.h"
 #include "tools/run_loop.h"
+#include "tools/run_spacemouse.h"
 
 #define PICTURE_S (1.0 / 60.0)
 #define DOUBLE_CLICK_S 0.35
@@ -26,6 +27,8 @@
 #define LIFT 0.14          /* likewise, of a hand that flies to a body */
 #define CALM_S 0.25        /* in which the view follows what moves */
 #define SEEK_S 0.1         /* of a recording, for a key */
+#define PUSH_SPEED 0.5     /* of the distance a second, for a SpaceMouse pushed to its end */
+#define TURN_SPEED 1.5     /* rad/s, for one turned to its end */
 
 typedef enum window_drag {
   DRAG_NONE = 0,
@@ -60,6 +63,8 @@ typedef struct run_window_state {
   bool has_picture;
   bool camera_free; /* the view frames what moves, until the mouse is used */
   window_mouse mouse;
+  run_spacemouse spacemouse;
+  bool is_pushed; /* the SpaceMouse has the hand */
   window_play play;
   bool help;
   bool plots;
@@ -182,10 +187,15 @@ static void hand_move(run_window_state *w, const double pixels[2][2], bool deep)
   run_stage_pull(w->stage, w->mouse.target);
 }
 
-static void hand_take(run_window_state *w)
+static void hand_target(run_window_state *w)
 {
   const view_pointer *p = &w->picture.frame.pointers[w->picture.hand];
   memcpy(w->mouse.target, p->is_pulled ? p->pull : p->device.position, sizeof w->mouse.target);
+}
+
+static void hand_take(run_window_state *w)
+{
+  hand_target(w);
   w->mouse.drag = DRAG_HAND;
 }
 
@@ -328,6 +338,39 @@ static void on_wheel(GLFWwindow *window, double x, double y)
   } else if (w->has_picture) {
     camera_zoom(w, y);
   }
+}
+
+/* A SpaceMouse pushes the hand along the axes of the picture, and turns the view. */
+static void spacemouse_act(run_window_state *w)
+{
+  double d[6];
+  window_camera c;
+  const bool moves = w->has_picture && run_spacemouse_read(&w->spacemouse, d);
+  if (!moves || !w->picture.can_pull || (d[0] == 0.0 && d[1] == 0.0 && d[2] == 0.0)) {
+    w->is_pushed = false;
+  }
+  if (!moves) {
+    return;
+  }
+  camera_hold(w);
+  camera_get(w, &c);
+  if (w->picture.can_pull && (d[0] != 0.0 || d[1] != 0.0 || d[2] != 0.0)) {
+    const double level = fmax(hypot(c.way[0], c.way[1]), 1e-6);
+    const double right[3] = {c.way[1] / level, -c.way[0] / level, 0.0};
+    const double up[3] = {right[1] * c.way[2], -right[0] * c.way[2],
+                          right[0] * c.way[1] - right[1] * c.way[0]};
+    if (!w->is_pushed && w->mouse.drag != DRAG_HAND) {
+      hand_target(w);
+    }
+    for (int i = 0; i < 3; ++i) {
+      w->mouse.target[i] +=
+          PUSH_SPEED * c.distance * w->step_s * (d[0] * right[i] + d[1] * up[i] + d[2] * c.way[i]);
+    }
+    w->is_pushed = true;
+    run_stage_pull(w->stage, w->mouse.target);
+  }
+  camera_orbit(w, TURN_SPEED * w->step_s * d[4] / ORBIT_PER_PX,
+               TURN_SPEED * w->step_s * d[3] / ORBIT_PER_PX);
 }
 
 /* What the window does itself; false: the run does it. */
@@ -495,10 +538,12 @@ static void help_describe(const run_window_state *w, view_panel *out)
                                          {"double click", "the hand grabs a body, or lets go"},
                                          {"right button", "turns the view"},
                                          {"middle button", "moves the view"},
-                                         {"wheel", "nearer, farther"}};
+                                         {"wheel", "nearer, farther"},
+                                         {"SpaceMouse", "pushes the hand, turns the view"}};
+  const size_t count = sizeof mouse / sizeof mouse[0] - (w->spacemouse.library == NULL);
   out->row_count = 0;
   snprintf(out->title, sizeof out->title, "keys and mouse");
-  for (size_t i = 0; i < sizeof mouse / sizeof mouse[0]; ++i) {
+  for (size_t i = 0; i < count; ++i) {
     char(*row)[72] = out->rows[out->row_count++];
     snprintf(row[0], sizeof row[0], "%s", mouse[i][0]);
     snprintf(row[1], sizeof row[1], "%s", mouse[i][1]);
@@ -585,6 +630,7 @@ static void window_loop(run_window_state *w)
     const double now = glfwGetTime();
     w->step_s = now - last;
     play_go_on(w, w->step_s);
+    spacemouse_act(w);
     last = now;
     if (!picture_show(w)) {
       break;
@@ -625,7 +671,9 @@ hap_status run_window(run_options *options, int (*run)(run_options *options), in
     status = hapi_fail(detail, HAP_ERROR_MEMORY, "--view: no memory for the run");
   }
   if (status >= HAP_OK) {
+    run_spacemouse_open(&w.spacemouse);
     window_loop(&w);
+    run_spacemouse_close(&w.spacemouse);
     run_stage_wish(w.stage, STAGE_END);
     pthread_join(thread, NULL);
     *out_code = r.code;
