@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""install_dir.py OWN PREFIX: where below PREFIX this Python looks for packages. OWN, the folder that
-meson names, where it is among them; else the first one. Below /usr/local Debian's has another one
-than meson thinks. Folders that do not exist yet count, too."""
+"""install_dir.py OWN PREFIX: where below PREFIX this Python looks for packages. OWN is the folder
+that meson names, and is taken where it is looked in; else the first one. Below /usr/local Debian
+has another one than meson thinks. Folders that do not exist yet count, too."""
 import os
 import site
 import sys
