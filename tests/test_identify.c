@@ -134,6 +134,8 @@ typedef struct fake {
   double bias;   /* N */
   double friction;
   double turned; /* rad: of the encoders' axes about z */
+  double wavers; /* by which the gain is more and less, in turn for 30 ms each */
+  int stalls;    /* so many reads apart are those that take 8 ms; 0: none */
   double quantum;
   int bad_read; /* the one that fails or is not finite; 0: none */
   bool fails;
@@ -158,7 +160,8 @@ static bool is_pushing(void)
 static void motion_step(fake *f, double h)
 {
   for (int i = 0; i < 3; ++i) {
-    double push = f->gain * f->force[i] + (i == 0 ? f->bias : 0.0) - 0.4 * f->v[i];
+    double gain = f->gain + (f->time_ns / 30000000 % 2 == 0 ? f->wavers : -f->wavers);
+    double push = gain * f->force[i] + (i == 0 ? f->bias : 0.0) - 0.4 * f->v[i];
     f->v[i] += h * (push / 0.2 + f->growth * f->v[i]);
     double brake = fmin(h * f->friction / 0.2, fabs(f->v[i]));
     f->v[i] -= copysign(brake, f->v[i]);
@@ -172,6 +175,9 @@ static hap_status motion_read(fake_device *d, int64_t time_ns, hap_pose *pose, u
   fake *f = &the;
   int reads = atomic_load(&d->reads);
   *buttons = 0;
+  if (f->stalls > 0 && reads % f->stalls == 0) {
+    nanosleep(&(struct timespec){.tv_nsec = 8000000}, NULL);
+  }
   if (!is_pushing()) {
     hapi_v3_set(f->force, 0.0, 0.0, 0.0);
   }
@@ -273,6 +279,21 @@ TEST(runaways_are_stopped)
   CHECK(identify_spec("virtual:hand=none,device_mass=0.3,kick=2:0.6/0/0", &found, &detail) ==
         HAP_ERROR_DEVICE);
   CHECK(strstr(detail.text, "0.50 m/s") != NULL);
+}
+
+/* What the fit cannot explain is the device's fault, or that of ticks that came late. */
+TEST(late_ticks_are_told_with_the_fault)
+{
+  hap_device_identity found;
+  hap_detail detail;
+  fake odd = {.gain = 1.0, .wavers = 0.8};
+  CHECK(identify_fake(&odd, &found, &detail) == HAP_ERROR_DEVICE);
+  CHECK_SAY(strstr(detail.text, "do not explain") && !strstr(detail.text, "late"), "%s",
+            detail.text);
+  odd.stalls = 100;
+  odd.pacing = HAP_PACING_HOST;
+  CHECK(identify_fake(&odd, &found, &detail) == HAP_ERROR_DEVICE);
+  CHECK_SAY(strstr(detail.text, "ticks came late, by up to"), "%s", detail.text);
 }
 
 TEST(failing_devices_are_let_go)

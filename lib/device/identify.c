@@ -33,6 +33,7 @@
 #define WAVE_S_MAX 0.5     /* without a turn for so long: more force */
 #define SPEED_SAMPLES 8u
 #define RESIDUAL_MOST 0.1
+#define LATE_PERIODS 3.0    /* from tick to tick */
 #define STIFFNESS_MOST 30.0 /* N/m; a hand that holds it loosely has 100 and more */
 #define WATCH_S 0.1
 #define AXES 3
@@ -334,29 +335,52 @@ static hap_status move_all(run *r)
 
 /* ---- what it comes to ---- */
 
+/* With a fault of the fit: whether the machine may be the reason, for what moved between two ticks
+ * far apart was not seen. */
+static hap_status fit_fail(const run *r, int axis, const char *what)
+{
+  const hapi_identify_record *record = &r->records[axis];
+  char text[360];
+  run at = *r;
+  uint32_t late = 0;
+  double longest = 0.0;
+  for (uint32_t i = 1; i < record->count; ++i) {
+    const double gap = record->samples[i].time - record->samples[i - 1].time;
+    late += gap * r->def->rate_hz > LATE_PERIODS;
+    longest = fmax(longest, gap);
+  }
+  const int used = snprintf(text, sizeof text, "%.200s", what);
+  if (late > 0) {
+    snprintf(text + used, sizeof text - (size_t)used,
+             "; %u of %u ticks came late, by up to %.0f ms: end other programs, use a real-time "
+             "priority, and try again",
+             late, record->count, 1e3 * longest);
+  }
+  at.axis = axis;
+  return run_fail(&at, text);
+}
+
 static hap_status add_axis(const run *r, int axis, hap_device_identity *io)
 {
   HAPI_ASSERT_INDEX(axis, AXES);
   hapi_identify_fit fit;
   char text[200];
   hap_detail why = {""};
-  run at = *r;
-  at.axis = axis;
   hap_status status = hapi_identify_fit_record(&r->records[axis], &fit, &why);
   if (status < HAP_OK) {
-    return run_fail(&at, why.text);
+    return fit_fail(r, axis, why.text);
   }
   if (fit.residual > RESIDUAL_MOST || fit.delay > HAPI_IDENTIFY_DELAY_MAX) {
     snprintf(text, sizeof text,
              "mass, damping, friction and a delay of at most %.0f ms do not explain %.0f %% of the "
              "force",
              1e3 * HAPI_IDENTIFY_DELAY_MAX, 100.0 * fit.residual);
-    return run_fail(&at, text);
+    return fit_fail(r, axis, text);
   }
   if (fit.stiffness > STIFFNESS_MOST) {
     snprintf(text, sizeof text, "a spring of %.0f N/m pulls it back: does a hand hold it?",
              fit.stiffness);
-    return run_fail(&at, text);
+    return fit_fail(r, axis, text);
   }
   io->mass = axis == 0 ? fit.mass : fmin(io->mass, fit.mass);
   io->damping = axis == 0 ? fit.damping : fmin(io->damping, fit.damping);
