@@ -93,3 +93,32 @@ int said_lines(const char *part)
 {
   return lines_with(ran.out, part) + lines_with(ran.err, part);
 }
+
+/* Options of a sanitizer behind those that are set. */
+static void options_add(const char *variable, const char *option)
+{
+  char both[1000];
+  const char *set = getenv(variable);
+  (void)snprintf(both, sizeof both, "%s%s%s", set != NULL ? set : "", set != NULL ? ":" : "",
+                 option);
+  setenv(variable, both, 1);
+}
+
+int program_again(const char *test, const char *variable, const char *value)
+{
+  int status = -1;
+  char only[200];
+  fflush(stdout);
+  pid_t child = fork();
+  if (child == 0) {
+    const int nowhere = open("/dev/null", O_WRONLY);
+    (void)snprintf(only, sizeof only, "only=%s", test);
+    setenv(variable, value, 1);
+    options_add("ASAN_OPTIONS", "detect_leaks=0");
+    options_add("TSAN_OPTIONS", "report_thread_leaks=0");
+    (void)dup2(nowhere, STDOUT_FILENO);
+    execl("/proc/self/exe", "test", only, (char *)NULL);
+    _exit(127);
+  }
+  return waitpid(child, &status, 0) == child && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
