@@ -91,11 +91,33 @@ need_packages() {
   fi
 }
 
-# quietly LOG COMMAND...: the output goes to LOG, and to stderr when the command fails.
+# watch LOG: how far a build is that writes to LOG, as long as this script lives.
+watch() {
+  local step
+  while kill -0 $$ 2>/dev/null; do
+    sleep 0.5
+    step=$(grep -o '^\[[0-9]*/[0-9]*\]' "$1" | tail -n 1) || true
+    printf '\r  %s' "$step" >&2
+  done
+}
+
+# quietly LOG COMMAND...: the output goes to LOG, and to stderr when the command fails. A terminal
+# sees how far it is.
 quietly() {
-  local log=$1
+  local log=$1 code=0 watcher=
   shift
-  if ! "$@" >"$log" 2>&1 </dev/null; then
+  : >"$log"
+  if [ -t 2 ]; then
+    watch "$log" &
+    watcher=$!
+  fi
+  "$@" >"$log" 2>&1 </dev/null || code=$?
+  if [ -n "$watcher" ]; then
+    kill "$watcher"
+    wait "$watcher" 2>/dev/null || true # it was killed
+    printf '\r\033[K' >&2
+  fi
+  if [ $code -ne 0 ]; then
     cat "$log" >&2
     say "failed: $* (log: $log)"
     return 1
@@ -109,9 +131,9 @@ build_is_good() {
     meson configure "$build" >/dev/null 2>&1 </dev/null
 }
 
-# build_all [TARGET...]: everything where none is named.
+# build_all [TARGET...]: everything where none is named, else those that this build has.
 build_all() {
-  local options
+  local options target targets=()
   read -ra options <<<"${HAPODE_MESON_OPTIONS:-}"
   mkdir -p "$build"
   if ! build_is_good; then
@@ -121,6 +143,11 @@ build_all() {
   elif [ ${#options[@]} -gt 0 ]; then
     quietly "$build/setup.log" meson configure "$build" "${options[@]}"
   fi
+  for target in "$@"; do
+    if grep -q "^build $target:" "$build/build.ninja"; then
+      targets+=("$target")
+    fi
+  done
   say "building"
-  quietly "$build/compile.log" meson compile -C "$build" "$@"
+  quietly "$build/compile.log" meson compile -C "$build" "${targets[@]}"
 }
