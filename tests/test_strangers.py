@@ -17,6 +17,8 @@ root = pathlib.Path(sys.argv[1]).resolve()
 scripts = sorted((root / "tests" / "strangers").glob("*.sh"))
 chosen = [path for path in scripts if not sys.argv[2:] or path.stem in sys.argv[2:]]
 PAGE = re.compile(r"^#: (\S+)\n(.*)$", re.M)
+# What a script has around a command of a page.
+AROUND = re.compile(r"^(\$rt|script -qec) | (\| grep .*|\|\| true|--check-wait 0|said <.*)$")
 points = []
 
 
@@ -34,7 +36,7 @@ def plain(text):
 def not_on_page(script):
     """Commands that their page does not have; what is behind a pipe is the test's."""
     for page, command in PAGE.findall(script.read_text("utf-8")):
-        command = re.sub(r"^(\$rt|script -qec) | (\| grep .*|\|\| true|--check-wait 0|said <.*)$", "", command)
+        command = AROUND.sub("", command)
         text = plain((root / page).read_text("utf-8"))
         if plain(command) not in text:
             yield f"{script.name}: {page} has no \"{command}\""
