@@ -75,7 +75,9 @@ def visit(script, tree, folder):
     seconds = time.monotonic() - begin
     good = done.returncode == 0 and (folder / "good").exists()
     print(f"# {script.stem}: {seconds / 60:.1f} minutes, with the minimal root")
-    return "" if good else log.read_text("utf-8", "replace")
+    text = log.read_text("utf-8", "replace")
+    print("".join(f"# {line}\n" for line in re.findall("^told: (.*)", text, re.M)), end="")
+    return "" if good else text
 
 
 def main():
