@@ -121,6 +121,30 @@ function compile(file) {
   return mujoco.MjModel.mj_loadXML(file);
 }
 
+// Of each geom that is a mesh the box around it in its body: least x, y, z, then most.
+function boxes(model) {
+  const out = [];
+  for (let g = 0; g < model.ngeom; ++g) {
+    const box = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
+    const mesh = model.geom_type[g] === 7 ? model.geom_dataid[g] : -1;
+    const [w, x, y, z] = model.geom_quat.slice(4 * g, 4 * g + 4);
+    for (let v = 0; mesh >= 0 && v < model.mesh_vertnum[mesh]; ++v) {
+      const from = 3 * (model.mesh_vertadr[mesh] + v);
+      const [a, b, c] = model.mesh_vert.slice(from, from + 3);
+      const t = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)];
+      const turned = [a + w * t[0] + y * t[2] - z * t[1], b + w * t[1] + z * t[0] - x * t[2],
+        c + w * t[2] + x * t[1] - y * t[0]];
+      for (let k = 0; k < 3; ++k) {
+        const at = turned[k] + model.geom_pos[3 * g + k];
+        box[k] = Math.min(box[k], at);
+        box[3 + k] = Math.max(box[3 + k], at);
+      }
+    }
+    out.push(...(mesh >= 0 ? box : [0, 0, 0, 0, 0, 0]));
+  }
+  return out;
+}
+
 function say(model) {
   const data = new mujoco.MjData(model);
   mujoco.mj_kinematics(model, data);
@@ -131,6 +155,7 @@ function say(model) {
   put('jnt_limited', Array.from({length: model.njnt}, (_, i) => Number(model.jnt(i).limited)));
   const weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY.value;
   put('gravity', weightless ? [0, 0, 0] : model.opt.gravity);
+  put('geom_box', boxes(model));
   put('xpos', data.xpos);
   put('xquat', data.xquat);
   lines.push(`bodies ${model.nbody}`);

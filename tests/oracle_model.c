@@ -104,6 +104,22 @@ static void joints_take(const mjModel *m, oracle_model *out)
   TAKE(to->qpos_spring, double, m->qpos_spring, m->nq);
 }
 
+static void box_take(const mjModel *m, int g, double out[6])
+{
+  const int mesh = m->geom_type[g] == mjGEOM_MESH ? m->geom_dataid[g] : -1;
+  for (int v = 0; mesh >= 0 && v < m->mesh_vertnum[mesh]; ++v) {
+    const float *from = m->mesh_vert + 3 * ((ptrdiff_t)m->mesh_vertadr[mesh] + v);
+    const mjtNum vertex[3] = {(mjtNum)from[0], (mjtNum)from[1], (mjtNum)from[2]};
+    mjtNum at[3];
+    mju_rotVecQuat(at, vertex, m->geom_quat + 4 * (ptrdiff_t)g);
+    for (int k = 0; k < 3; ++k) {
+      at[k] += m->geom_pos[3 * (ptrdiff_t)g + k];
+      out[k] = v == 0 || at[k] < out[k] ? at[k] : out[k];
+      out[3 + k] = v == 0 || at[k] > out[3 + k] ? at[k] : out[3 + k];
+    }
+  }
+}
+
 static void geoms_take(const mjModel *m, oracle_model *out)
 {
   oracle_geoms *to = &out->geoms;
@@ -116,6 +132,11 @@ static void geoms_take(const mjModel *m, oracle_model *out)
   TAKE(to->pos, double, m->geom_pos, 3 * n);
   TAKE(to->quat, double, m->geom_quat, 4 * n);
   TAKE(to->size, double, m->geom_size, 3 * n);
+  double *boxes = model_take(out, 6 * (size_t)n * sizeof(double));
+  for (int g = 0; g < m->ngeom; ++g) {
+    box_take(m, g, boxes + 6 * (ptrdiff_t)g);
+  }
+  to->box = boxes;
   TAKE(to->friction, double, m->geom_friction, 3 * n);
   TAKE(to->rgba, double, m->geom_rgba, 4 * n);
   TAKE(to->material_rgba, double, m->mat_rgba, 4 * (ptrdiff_t)m->nmat);
@@ -217,6 +238,7 @@ static const array_place arrays[] = {
     REALS("geom_pos", geoms.pos),
     REALS("geom_quat", geoms.quat),
     REALS("geom_size", geoms.size),
+    REALS("geom_box", geoms.box),
     REALS("geom_friction", geoms.friction),
     REALS("geom_rgba", geoms.rgba),
     REALS("mat_rgba", geoms.material_rgba),

@@ -69,6 +69,7 @@ typedef struct oracle_geoms {
   const double *pos;
   const double *quat;
   const double *size;
+  const double *box; /* of a mesh, in its body: least x, y, z, then most */
   const double *friction;
   const double *rgba;
   const double *material_rgba;

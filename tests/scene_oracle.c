@@ -128,6 +128,22 @@ static void joint_compare(const comparing *c, const import_joint *joint, int j)
   }
 }
 
+/* A mesh is where it is by the box around it: MuJoCo tells its points in the axes of its inertia. */
+static void mesh_compare(const comparing *c, const import_geom *geom, int g)
+{
+  double box[6] = {0};
+  for (size_t v = 0; v < geom->mesh->vertex_count; ++v) {
+    double at[3];
+    hapi_pose_point(geom->pose.position, geom->pose.quat_wxyz, geom->mesh->vertices_xyz + 3 * v,
+                    at);
+    for (int k = 0; k < 3; ++k) {
+      box[k] = v == 0 ? at[k] : fmin(box[k], at[k]);
+      box[3 + k] = v == 0 ? at[k] : fmax(box[3 + k], at[k]);
+    }
+  }
+  vectors_compare(c, "box of mesh", geom->name, box, c->theirs->geoms.box + 6 * (ptrdiff_t)g, 6);
+}
+
 static void geom_compare(const comparing *c, const import_geom *geom, int g)
 {
   static const int types[] = {ORACLE_PLANE, ORACLE_SPHERE,    ORACLE_CAPSULE, ORACLE_CYLINDER,
@@ -139,7 +155,9 @@ static void geom_compare(const comparing *c, const import_geom *geom, int g)
   if (types[geom->shape] != geoms->type[g]) {
     return;
   }
-  if (geom->shape != IMPORT_MESH) { /* its frame is put into the centre of mass */
+  if (geom->shape == IMPORT_MESH && geom->mesh != NULL) {
+    mesh_compare(c, geom, g);
+  } else {
     vectors_compare(c, "place of geom", name, geom->pose.position, geoms->pos + 3 * g, 3);
     turn_compare(c, "turn of geom", name, geom->pose.quat_wxyz, geoms->quat + 4 * g);
   }

@@ -17,7 +17,8 @@ typedef struct oracle_found {
 } oracle_found;
 
 bool scene_oracle_is_there(void);
-/* False: MuJoCo refuses the file. Meshes of bodies are compared by their mass alone. */
+/* False: MuJoCo refuses the file. Meshes of bodies are compared by their mass and the box around
+ * them. */
 bool scene_oracle(const char *path, const import_model *ours, oracle_found *out);
 
 /* Where a body of MJCF, from 0, has its frame after a time, in MuJoCo's own steps of 0.2 ms. False:
