@@ -38,6 +38,7 @@ def main(root, cases, files):
     done = subprocess.run([cases], env=env, capture_output=True, text=True, check=False)
     points = [re.sub(r"^(not ok|ok) \d+", r"\1 %d", line) for line in done.stdout.splitlines()
               if re.match(r"(not )?ok |#", line)]
+    points.append(("ok %d" if done.returncode == 0 else "not ok %d") + " - test_scene_files ends")
     points.append(("ok %d" if refused_well(root, files, env) else "not ok %d") + " - no scenes")
     scenes = sorted(pathlib.Path(root, "..", "shared", "scenes").glob("*.xml"))
     if scenes:
