@@ -32,9 +32,9 @@ int program_finish(pid_t child);
 void program_look(void);
 /* Starts and finishes. */
 int run(const char *format, ...);
-/* This test program once more, with that test alone and a variable set, as a process of its own that
- * may end as it likes: sanitizers then tell no memory and threads that are left. What it says is
- * dropped. The exit code; -1: a signal ended it. */
+/* This test program once more, with that test alone and a variable set, as a process of its own,
+ * which may end as it likes: sanitizers then tell no memory and threads that are left. What it
+ * says is dropped. The exit code; -1: a signal ended it. */
 int program_again(const char *test, const char *variable, const char *value);
 /* ran.err holds the text, else a comment says so. */
 bool says(const char *text);

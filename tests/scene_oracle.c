@@ -128,7 +128,7 @@ static void joint_compare(const comparing *c, const import_joint *joint, int j)
   }
 }
 
-/* A mesh is where it is by the box around it: MuJoCo tells its points in the axes of its inertia. */
+/* By the box around it: MuJoCo tells a mesh's points in the axes of its inertia. */
 static void mesh_compare(const comparing *c, const import_geom *geom, int g)
 {
   double box[6] = {0};
