@@ -93,20 +93,20 @@ static void loader_folders(doctor_check *check)
   doctor_append(check, "; looked in LD_LIBRARY_PATH (",
                 set != NULL && *set != '\0' ? set : "not set");
   doctor_append(check, "), /etc/ld.so.cache", "");
-  if (self == NULL || dlinfo(self, RTLD_DI_SERINFOSIZE, &size) != 0) {
-    return;
-  }
-  Dl_serinfo *folders = malloc(size.dls_size);
+  const bool told = self != NULL && dlinfo(self, RTLD_DI_SERINFOSIZE, &size) == 0;
+  Dl_serinfo *folders = told ? malloc(size.dls_size) : NULL;
   if (folders != NULL && dlinfo(self, RTLD_DI_SERINFOSIZE, folders) == 0 &&
       dlinfo(self, RTLD_DI_SERINFO, folders) == 0) {
     for (unsigned i = 0; i < folders->dls_cnt; ++i) {
-      if (set == NULL || strstr(set, folders->dls_serpath[i].dls_name) == NULL) {
+      if ((folders->dls_serpath[i].dls_flags & LA_SER_LIBPATH) == 0) {
         doctor_append(check, ", ", folders->dls_serpath[i].dls_name);
       }
     }
   }
   free(folders);
-  (void)dlclose(self);
+  if (self != NULL) {
+    (void)dlclose(self);
+  }
 }
 
 void doctor_check_vendors(const doctor_place *place, doctor_check *check)
