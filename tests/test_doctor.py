@@ -121,11 +121,12 @@ def check_rules(program, folder):
 
 def check_absent_libraries(program, folder):
     """What the devices' own errors say is what the doctor says: names, and where they were."""
-    root, libs = folder + "/empty", folder + "/no/libraries"
+    root, libs = folder + "/empty", folder + "/usr/lib"
     good_root(root)
     os.makedirs(libs)
     found = findings(program, root, LD_LIBRARY_PATH=libs)["vendor_libraries"]
-    check(f"LD_LIBRARY_PATH ({libs})" in found["text"] and "/etc/ld.so.cache" in found["text"] and
+    check(f"LD_LIBRARY_PATH ({libs})" in found["text"] and found["text"].count(libs) == 1 and
+          "/etc/ld.so.cache" in found["text"] and
           re.search(r", /(usr/)?lib(64|/)", found["text"]), "where libraries were looked for")
     for device in ("forcedimension", "openhaptics"):
         done = subprocess.run([program, "--scene", "row10", "--device", device], check=False,

@@ -83,6 +83,18 @@ static bool library_is_unseen(const doctor_place *place, const maker_library *ma
   return false;
 }
 
+/* Whether it is one of the folders that colons or semicolons part. */
+static bool folders_have(const char *folders, const char *name)
+{
+  const size_t length = strlen(name);
+  for (const char *at = folders; at != NULL; at = strpbrk(at, ":;"), at += at != NULL) {
+    if (strncmp(at, name, length) == 0 && strchr(":;", at[length]) != NULL) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /* Where the loader looks, in its order. Its list, /etc/ld.so.cache, comes before the folders that
  * it always knows. */
 static void loader_folders(doctor_check *check)
@@ -98,7 +110,7 @@ static void loader_folders(doctor_check *check)
   if (folders != NULL && dlinfo(self, RTLD_DI_SERINFOSIZE, folders) == 0 &&
       dlinfo(self, RTLD_DI_SERINFO, folders) == 0) {
     for (unsigned i = 0; i < folders->dls_cnt; ++i) {
-      if ((folders->dls_serpath[i].dls_flags & LA_SER_LIBPATH) == 0) {
+      if (!folders_have(set, folders->dls_serpath[i].dls_name)) {
         doctor_append(check, ", ", folders->dls_serpath[i].dls_name);
       }
     }
