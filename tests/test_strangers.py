@@ -7,6 +7,7 @@ name of a page must be on that page."""
 import os
 import pathlib
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -57,6 +58,11 @@ def copied(folder):
     return tree
 
 
+def children_s():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def visit(script, tree, folder):
     log = folder / "log"
     steps = folder / "visit.sh"
@@ -64,7 +70,7 @@ def visit(script, tree, folder):
                      "echo 'APT::Sandbox::User \"root\"; APT::Install-Recommends \"0\";' "
                      "> /etc/apt/apt.conf.d/99visit\n"
                      "cd /srv/hapode\nset -eux\n" + script.read_text("utf-8"), "utf-8")
-    begin = time.monotonic()
+    begin, used = time.monotonic(), children_s()
     with open(log, "w", encoding="utf-8") as said:
         done = subprocess.run(
             ["mmdebstrap", "--variant=minbase", "--format=null",
@@ -74,7 +80,8 @@ def visit(script, tree, folder):
             stdout=said, stderr=said, check=False, timeout=3000)
     seconds = time.monotonic() - begin
     good = done.returncode == 0 and (folder / "good").exists()
-    print(f"# {script.stem}: {seconds / 60:.1f} minutes, with the minimal root")
+    print(f"# {script.stem}: {seconds / 60:.1f} minutes, {(children_s() - used) / 60:.1f} of a "
+          "processor, with the minimal root")
     text = log.read_text("utf-8", "replace")
     print("".join(f"# {line}\n" for line in re.findall("^told: (.*)", text, re.M)), end="")
     return "" if good else text
