@@ -363,6 +363,11 @@ void hapi_physics_set_tape(hapi_physics *physics, hapi_tape *tape)
   physics->tape.tape = tape;
 }
 
+void hapi_physics_set_exchange(hapi_physics *physics, hapi_exchange *exchange)
+{
+  physics->config.exchange = exchange;
+}
+
 void hapi_physics_set_latency(hapi_physics *physics, double seconds)
 {
   physics->wanted.latency_s = seconds;

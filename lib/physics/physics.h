@@ -67,6 +67,9 @@ int64_t hapi_physics_last_cycle(const hapi_physics *physics);
 double hapi_physics_period(const hapi_physics *physics);
 double hapi_physics_next_period(const hapi_physics *physics);
 
+/* [control] Before begin: an exchange of the same capacity in place of that of the config. */
+void hapi_physics_set_exchange(hapi_physics *physics, hapi_exchange *exchange);
+
 /* [control] LOCKSTEP: time from a cycle to the use of its model; negative: the model's own. */
 void hapi_physics_set_latency(hapi_physics *physics, double seconds);
 

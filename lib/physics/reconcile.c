@@ -228,14 +228,16 @@ static void set_state(const hapi_body_slot *slot, dBodyID body, const hap_pose *
 }
 
 /* A body that the loop has let go since the last message. It did so some ticks after the time that
- * ODE's state is for: back by that, as the step to come goes over the whole interval. */
+ * ODE's state is for: back by that, as the step to come goes over the whole interval. A message that
+ * was long on its way tells of a time before: on by that. */
 static void take_last_state(const hapi_account *account, const hapi_slot_account *of,
                             const hapi_body_slot *slot, dBodyID body, const hapi_state_body *in)
 {
   hap_pose pose = in->owned_pose;
   double since = account->cycle->step_scale * 1e-9 *
                  (double)(in->owned_until_ns - account->cycle->last_cycle_ns);
-  since = since > account->cycle->step_s ? account->cycle->step_s : since < 0.0 ? 0.0 : since;
+  double late = account->cycle->step_scale * account->cycle->config->look_ahead_s;
+  since = since > account->cycle->step_s ? account->cycle->step_s : since < -late ? -late : since;
   hapi_v3_madd(pose.position, -since, in->owned_twist.linear, pose.position);
   hap_twist twist = in->owned_twist;
   if ((in->flags & HAPI_BODY_TOUCHED) == 0) { /* it fell: the step gives it that again */

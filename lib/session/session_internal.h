@@ -28,11 +28,23 @@ typedef struct hapi_session_gone {
   void *arg;
 } hapi_session_gone;
 
+/* Carries the messages between physics and the loop where each has an exchange of its own. All are
+ * called in drive LOCKSTEP, at the time of the tick. */
+typedef struct hapi_ferry {
+  void *of;
+  void (*before_cycle)(void *of, int64_t now_ns); /* the loop's newest state to physics */
+  void (*after_cycle)(void *of, int64_t now_ns);  /* model and near away from physics */
+  void (*before_tick)(void *of, int64_t now_ns);  /* model and near to the loop */
+  void (*after_tick)(void *of, int64_t now_ns);   /* the state away from the loop */
+} hapi_ferry;
+
 struct hap_session {
   hap_session_def def; /* its expert and research are the next two */
   hap_expert_def expert;
   hap_research_def research;
-  hapi_exchange *exchange;
+  hapi_exchange *exchange;       /* of the loop, and of physics where there is no other */
+  hapi_exchange *world_exchange; /* of physics, with a ferry; else NULL */
+  hapi_ferry ferry;
   hapi_haptic *haptic;
   hapi_textures *textures;
   hapi_physics *physics;
@@ -82,6 +94,12 @@ hap_status hapi_session_say(const hap_session *session, hap_status status, const
 hap_status hapi_session_may_change(const hap_session *session);
 /* What create has made; stopped before. */
 void hapi_session_free(hap_session *session);
+
+/* session_far.c: physics and the loop do not share memory from the next start on: the ferry brings
+ * what one tells the other. HAP_ERROR_STATE: started already. HAP_ERROR_UNSUPPORTED: another drive
+ * than LOCKSTEP, another model than CONTACT, looking back, which reads the loop's path, or an
+ * application that is asked about contacts. */
+hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry);
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */

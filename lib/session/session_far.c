@@ -1,0 +1,39 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "session/session_internal.h"
+
+#include "base/log.h"
+
+/* Physics and loop without memory in common: what one knows of the other comes in messages. */
+
+static hap_status far_check(const hap_session *session)
+{
+  const hap_session_def *def = &session->def;
+  const char *what = def->drive != HAP_DRIVE_LOCKSTEP      ? "another drive than lockstep"
+                     : def->model != HAP_MODEL_CONTACT     ? "another model than contact"
+                     : def->expert->lookback > 0.0         ? "looking back"
+                     : hapi_physics_asks(session->physics) ? "a contact callback"
+                     : session->player != NULL             ? "a replay"
+                                                           : NULL;
+  return what == NULL ? HAP_OK
+                      : hapi_session_fail(session, HAP_ERROR_UNSUPPORTED,
+                                          "%s does not go with a loop far from its world", what);
+}
+
+hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
+{
+  if (session->started || session->ran) {
+    return hapi_session_fail(session, HAP_ERROR_STATE, "the session has been started already");
+  }
+  HAPI_TRY(far_check(session));
+  if (session->world_exchange == NULL) {
+    hap_status status =
+        hapi_exchange_create(hapi_exchange_capacity(session->exchange), &session->world_exchange);
+    if (status < HAP_OK) {
+      return hapi_session_fail(session, status, "no memory for the messages of physics");
+    }
+    hapi_physics_set_exchange(session->physics, session->world_exchange);
+  }
+  session->ferry = *ferry;
+  return HAP_OK;
+}
