@@ -28,6 +28,8 @@ typedef struct contact_world {
   hap_pointer_def hand_def;
   hap_pointer_expert_def hand_expert;
   hap_pointer_research_def hand_research;
+  void (*join)(void *user, hap_session *session); /* before the start; NULL: nothing to do */
+  void *join_user;
   hap_session *session;
   hap_pointer_id hand;
 
@@ -214,6 +216,9 @@ static inline void cw_start(contact_world *w, double x, double y, double z)
   (void)hap_session_detail(w->session, &detail);
   REQUIRE_SAY(added, "%s", detail.text);
   cw_put_hand(w, 0.0, 0.0, 0.0);
+  if (w->join != NULL) {
+    w->join(w->join_user, w->session);
+  }
   session_run(w->session);
 }
 

@@ -7,7 +7,9 @@
 #include "tests/tap.h"
 
 #include "bench/accuracy.h"
+#include "tests/contact_world.h"
 #include "tests/held_messages.h"
+#include "tests/logged.h"
 
 #define LATE_S 1.0    /* the hand begins to move so long after the start */
 #define MARGIN_S 0.05 /* of looking ahead, beyond the round trip */
@@ -115,4 +117,103 @@ TEST_EACH(cases, const far_case *row)
   CHECK(with <= beside + 0.002);
   CHECK(without >= row->without_least);
   accuracy_motion_free(&reference);
+}
+
+/* ---- room ---- */
+
+/* Two cubes have room; the hand is to be able to touch all of them within the time. */
+static contact_world *row_open(double look_ahead_s)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  for (int i = 0; i < 6; ++i) {
+    (void)cw_add_cube(w, 0.1, 0.05, 0.2 * i, 0.0, 0.025);
+  }
+  w->def.max_bodies = 2;
+  w->expert.look_ahead = look_ahead_s;
+  cw_start(w, -0.04, 0.0, 0.025);
+  cw_run(w, 200);
+  return w;
+}
+
+TEST(what_looking_ahead_drops_for_room_is_counted_and_said)
+{
+  logged[0] = '\0';
+  log_listen(true);
+  hap_stats near = cw_stats(row_open(0.0));
+  CHECK(near.ahead.look_ahead_s == 0.0 && near.ahead.dropped == 0 && near.ahead.dropped_now == 0);
+  CHECK(strstr(logged, "looking ahead") == NULL);
+  contact_world *w = row_open(0.3); /* 15 m/s^2 (0.1 s + 0.3 s)^2 = 2.4 m */
+  hap_stats far = cw_stats(w);
+  CHECK(far.ahead.look_ahead_s == 0.3 && far.ahead.dropped_now >= 4);
+  CHECK(far.ahead.dropped > far.ahead.dropped_now);
+  hap_detail detail = {""};
+  CHECK(hap_session_detail(w->session, &detail) == HAP_OK);
+  CHECK(strstr(detail.text, "hap_stats.ahead.dropped") != NULL);
+  const char *first = strstr(logged, "looking ahead");
+  CHECK(first != NULL && strstr(first + 1, "looking ahead") == NULL); /* once */
+  log_listen(false);
+}
+
+/* ---- the guard ---- */
+
+#define STEP_NS 50000000LL /* of physics */
+#define SILENT_NS 1500000000LL
+#define FORCE 6.0 /* N: 3 mm of 2000 N/m */
+
+static held_messages far_held;
+
+static void far_held_join(void *user, hap_session *session)
+{
+  const double *delay_s = user;
+  REQUIRE(held_begin(&far_held, session, *delay_s) >= HAP_OK);
+  far_held.silent_from_ns = SILENT_NS;
+}
+
+static contact_world *pressed_open(double *delay_s, double look_ahead_s)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  w->research.guard = HAP_GUARD_ON;
+  w->hand_def.radius = 0.01;
+  w->hand_def.max_force = 20.0;
+  w->def.max_bodies = 8;
+  w->def.max_contacts = 64;
+  w->expert.look_ahead = look_ahead_s;
+  w->join = far_held_join;
+  w->join_user = delay_s;
+  cw_start(w, 0.0, 0.0, 0.007);
+  return w;
+}
+
+/* The last model is of 1.45 s. The force stays for two steps, what was agreed on and a tick; then
+ * it goes within 100 ms. */
+TEST(the_force_of_a_late_world_stays_and_an_outage_takes_it_away_in_100_ms)
+{
+  double delay_s = 0.1;
+  contact_world *w = pressed_open(&delay_s, 0.25);
+  int64_t last_ns = SILENT_NS - STEP_NS;
+  int64_t old_ns = last_ns + 2 * STEP_NS + 250000000LL + 1000000LL;
+  for (int i = 0; i < 2200; ++i) {
+    cw_tick(w);
+    int64_t now_ns = i * 1000000LL;
+    if (now_ns >= 500000000LL && now_ns < old_ns) {
+      CHECK_NEAR(w->force[2], FORCE, 1e-6);
+    } else if (now_ns >= old_ns + 100000000LL) {
+      CHECK_NEAR(w->force[2], 0.0, 1e-9);
+    }
+  }
+  CHECK(cw_stats(w).faults.stale_times == 1 && cw_stats(w).faults.count == 0);
+  held_end(&far_held);
+}
+
+/* So it was before anything was agreed on: nothing is felt. */
+TEST(a_delay_that_was_not_agreed_on_is_an_outage)
+{
+  double delay_s = 0.15;
+  contact_world *w = pressed_open(&delay_s, 0.0);
+  cw_run(w, 1400);
+  CHECK_NEAR(w->force[2], 0.0, 1e-9);
+  CHECK(cw_stats(w).faults.stale_ticks > 1000);
+  held_end(&far_held);
 }
