@@ -78,8 +78,8 @@ typedef struct hap_link_address {
   uint32_t part;    /* below HAP_LINK_PARTS; of a reliable message 0 */
 } hap_link_address;
 
-/* [owner] Sends a newest message of 1..HAP_LINK_NEWEST_MOST bytes. It replaces one of the same
- * peer, channel and part that is still on its way. A transport without room drops it, as a network
+/* [owner] Sends a newest message of 1..HAP_LINK_NEWEST_MOST bytes. It may replace one of the same
+ * peer, channel and part that was not polled yet. A transport without room drops it, as a network
  * may. HAP_ERROR_ARGUMENT: address or length out of range. HAP_ERROR_NOT_FOUND: the peer is not
  * there. HAP_ERROR_IO: the transport has failed. hap_link_detail says which. */
 HAP_NODISCARD HAP_API hap_status hap_link_send_newest(hap_link *link, int64_t now_ns,
@@ -132,7 +132,8 @@ HAP_API void hap_link_path_def_init(hap_link_path_def *def, size_t size_of_def);
 HAP_NODISCARD HAP_API hap_status hap_link_local_serve(hap_link **out, hap_detail *detail);
 
 /* [server's owner] A client's end to a server of hap_link_local_serve. Both ends belong to one
- * thread. name: of the client, at most HAP_LINK_NAME_MOST bytes. up, down: to the server and from
+ * thread, and both are polled with the same clock. The client joins with its first poll: then the
+ * server hears of it, and answers. name: of the client, at most HAP_LINK_NAME_MOST bytes. up, down: to the server and from
  * it, NULL for the defaults; their delays hold for what is sent from now on. Either end may be
  * closed first. HAP_ERROR_ARGUMENT: server is of another kind, or a number is out of range.
  * HAP_ERROR_STATE: another client of the server has the name. */

@@ -27,6 +27,7 @@ LAYERS = {
     "lib/sync": ["lib/base", "lib/proximity"],
     "lib/proximity": ["lib/base"],
     "lib/device": ["lib/base"],
+    "lib/link": ["lib/base"],
     "lib/solver": ["lib/base"],
     "lib/pointer": ["lib/base", "lib/sync"],
     "lib/local": ["lib/base", "lib/sync", "lib/proximity", "lib/solver", "lib/pointer"],
