@@ -37,3 +37,37 @@ hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
   session->ferry = *ferry;
   return HAP_OK;
 }
+
+/* ---- both ends in one process ---- */
+
+static void far_before_cycle(void *of, int64_t now_ns)
+{
+  hapi_world_end_receive(&((hapi_far *)of)->world, now_ns);
+}
+
+static void far_after_cycle(void *of, int64_t now_ns)
+{
+  hapi_world_end_send(&((hapi_far *)of)->world, now_ns);
+}
+
+static void far_before_tick(void *of, int64_t now_ns)
+{
+  hapi_loop_end_receive(&((hapi_far *)of)->loop, now_ns);
+}
+
+static void far_after_tick(void *of, int64_t now_ns)
+{
+  hapi_loop_end_send(&((hapi_far *)of)->loop, now_ns);
+}
+
+hap_status hapi_session_set_far(hap_session *session, hapi_far *far)
+{
+  const hapi_ferry ferry = {far, far_before_cycle, far_after_cycle, far_before_tick,
+                            far_after_tick};
+  HAPI_TRY(hapi_session_set_ferry(session, &ferry));
+  far->world.exchange = session->world_exchange;
+  far->world.terms = (hapi_terms){.look_ahead_s = session->def.expert->look_ahead,
+                                  .period_s = 1.0 / session->def.physics_hz};
+  far->loop.exchange = session->exchange;
+  return HAP_OK;
+}

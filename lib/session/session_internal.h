@@ -17,6 +17,8 @@
 #include "haptic/haptic.h"
 #include "physics/physics.h"
 #include "record/recorder.h"
+#include "remote/loop_end.h"
+#include "remote/world_end.h"
 #include "sync/exchange.h"
 #include "sync/texture.h"
 
@@ -100,6 +102,15 @@ void hapi_session_free(hap_session *session);
  * than LOCKSTEP, another model than CONTACT, looking back, which reads the loop's path, or an
  * application that is asked about contacts. */
 hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry);
+
+/* A world's end and a loop's end in one process. The caller fills in links and codecs. */
+typedef struct hapi_far {
+  hapi_world_end world;
+  hapi_loop_end loop;
+} hapi_far;
+
+/* The two ends as the session's ferry; *far outlives the session. Errors as above. */
+hap_status hapi_session_set_far(hap_session *session, hapi_far *far);
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */

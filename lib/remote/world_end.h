@@ -1,0 +1,25 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_REMOTE_WORLD_END_H
+#define HAPODE_REMOTE_WORLD_END_H
+
+/* The world's end of a session whose loop is elsewhere: physics' exchange on one side, the server's
+ * link on the other. It has one client at a time; of a second one nothing is taken. */
+
+#include "remote/end.h"
+#include "sync/exchange.h"
+
+typedef struct hapi_world_end {
+  hapi_end end;
+  hapi_exchange *exchange; /* of physics */
+  hapi_terms terms;        /* for whoever joins */
+  uint64_t tick;           /* of the newest state given */
+  uint64_t old;            /* states that came behind a newer one */
+} hapi_world_end;
+
+/* [physics] Before a cycle: the client's newest state to physics. */
+void hapi_world_end_receive(hapi_world_end *world, int64_t now_ns);
+/* [physics] After a cycle: its model and its pairs to the client. */
+void hapi_world_end_send(hapi_world_end *world, int64_t now_ns);
+
+#endif
