@@ -111,13 +111,17 @@ static void figures_take(remote_run *run, double seconds, const accuracy_motion 
                                                           : run->far.loop.end.detail;
 }
 
+double remote_look_ahead(const remote_run *run)
+{
+  return run->look_ahead_s >= 0.0 ? run->look_ahead_s
+                                  : 2.0 * (run->way.delay_s + run->way.jitter_s) + REMOTE_MARGIN_S;
+}
+
 hap_status remote_apart(bench *b, remote_run *run, accuracy_motion *out)
 {
   accuracy_run_def def;
   accuracy_run_def_init(&def);
-  def.expert.look_ahead = run->look_ahead_s >= 0.0
-                              ? run->look_ahead_s
-                              : 2.0 * (run->way.delay_s + run->way.jitter_s) + REMOTE_MARGIN_S;
+  def.expert.look_ahead = remote_look_ahead(run);
   def.join = apart_join;
   def.join_user = run;
   hap_status status = links_open(run, &b->detail);

@@ -51,6 +51,8 @@ typedef struct remote_run {
   hap_link *client;
 } remote_run;
 
+double remote_look_ahead(const remote_run *run); /* s, of physics */
+
 /* NULL: there is none of that name. */
 const accuracy_scene *remote_scene(const char *name);
 
