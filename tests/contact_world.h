@@ -28,8 +28,6 @@ typedef struct contact_world {
   hap_pointer_def hand_def;
   hap_pointer_expert_def hand_expert;
   hap_pointer_research_def hand_research;
-  void (*join)(void *user, hap_session *session); /* before the start; NULL: nothing to do */
-  void *join_user;
   hap_session *session;
   hap_pointer_id hand;
 
@@ -197,13 +195,11 @@ static inline hap_stats cw_stats(const contact_world *w)
   return session_stats(w->session);
 }
 
-/* Session and hand, started. The first 16 bodies are traced. */
-static inline void cw_start(contact_world *w, double x, double y, double z)
+/* Session and hand. The first 16 bodies are traced. */
+static inline void cw_make(contact_world *w, double x, double y, double z)
 {
   size_t traced = w->body_count < CW_TRACED_MAX ? (size_t)w->body_count : CW_TRACED_MAX;
-  w->ode.world = w->world;
-  w->ode.space = w->space;
-  w->ode.user = w;
+  w->ode.world = w->world, w->ode.space = w->space, w->ode.user = w;
   w->seen.range_min = UINT32_MAX;
   w->session = session_make(&w->def, &w->ode);
   memcpy(w->hand_at, AT(x, y, z), sizeof w->hand_at);
@@ -216,9 +212,11 @@ static inline void cw_start(contact_world *w, double x, double y, double z)
   (void)hap_session_detail(w->session, &detail);
   REQUIRE_SAY(added, "%s", detail.text);
   cw_put_hand(w, 0.0, 0.0, 0.0);
-  if (w->join != NULL) {
-    w->join(w->join_user, w->session);
-  }
+}
+
+static inline void cw_start(contact_world *w, double x, double y, double z)
+{
+  cw_make(w, x, y, z);
   session_run(w->session);
 }
 

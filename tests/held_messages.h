@@ -100,14 +100,14 @@ static inline void held_after_tick(void *of, int64_t now_ns)
 /* Before the session starts; *h outlives it. */
 static inline hap_status held_begin(held_messages *h, hap_session *session, double delay_s)
 {
-  const hapi_ferry ferry = {h, held_before_cycle, held_after_cycle, held_before_tick,
-                            held_after_tick};
+  const hapi_ferry ferry = {
+      NULL, h, held_before_cycle, held_after_cycle, held_before_tick, held_after_tick};
   hap_status status = hapi_session_set_ferry(session, &ferry);
   if (status < HAP_OK) {
     return status;
   }
   h->delay_ns = (int64_t)(1e9 * delay_s);
-  h->world = session->world_exchange;
+  h->world = session->ferry.exchange;
   h->loop = session->exchange;
   return held_queue_init(&h->model, h->world, HAPI_CHANNEL_MODEL) &&
                  held_queue_init(&h->near, h->world, HAPI_CHANNEL_NEAR) &&

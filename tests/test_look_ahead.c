@@ -163,14 +163,7 @@ TEST(what_looking_ahead_drops_for_room_is_counted_and_said)
 
 static held_messages far_held;
 
-static void far_held_join(void *user, hap_session *session)
-{
-  const double *delay_s = user;
-  REQUIRE(held_begin(&far_held, session, *delay_s) >= HAP_OK);
-  far_held.silent_from_ns = SILENT_NS;
-}
-
-static contact_world *pressed_open(double *delay_s, double look_ahead_s)
+static contact_world *pressed_open(double delay_s, double look_ahead_s)
 {
   contact_world *w = cw_new(CW_GRAVITY);
   cw_add_floor(w);
@@ -180,9 +173,10 @@ static contact_world *pressed_open(double *delay_s, double look_ahead_s)
   w->def.max_bodies = 8;
   w->def.max_contacts = 64;
   w->expert.look_ahead = look_ahead_s;
-  w->join = far_held_join;
-  w->join_user = delay_s;
-  cw_start(w, 0.0, 0.0, 0.007);
+  cw_make(w, 0.0, 0.0, 0.007);
+  REQUIRE(held_begin(&far_held, w->session, delay_s) >= HAP_OK);
+  far_held.silent_from_ns = SILENT_NS;
+  session_run(w->session);
   return w;
 }
 
@@ -190,8 +184,7 @@ static contact_world *pressed_open(double *delay_s, double look_ahead_s)
  * it goes within 100 ms. */
 TEST(the_force_of_a_late_world_stays_and_an_outage_takes_it_away_in_100_ms)
 {
-  double delay_s = 0.1;
-  contact_world *w = pressed_open(&delay_s, 0.25);
+  contact_world *w = pressed_open(0.1, 0.25);
   int64_t last_ns = SILENT_NS - STEP_NS;
   int64_t old_ns = last_ns + 2 * STEP_NS + 250000000LL + 1000000LL;
   for (int i = 0; i < 2200; ++i) {
@@ -210,8 +203,7 @@ TEST(the_force_of_a_late_world_stays_and_an_outage_takes_it_away_in_100_ms)
 /* So it was before anything was agreed on: nothing is felt. */
 TEST(a_delay_that_was_not_agreed_on_is_an_outage)
 {
-  double delay_s = 0.15;
-  contact_world *w = pressed_open(&delay_s, 0.0);
+  contact_world *w = pressed_open(0.15, 0.0);
   cw_run(w, 1400);
   CHECK_NEAR(w->force[2], 0.0, 1e-9);
   CHECK(cw_stats(w).faults.stale_ticks > 1000);

@@ -141,11 +141,10 @@ TEST(all_scenes_on_all_ways)
 static hapi_far far_ends;
 static hap_link *far_links[2];
 
-static void lossy_join(void *user, hap_session *session)
+static void lossy_join(hap_session *session)
 {
   hap_link_path_def path;
   hapi_codec codecs[2];
-  (void)user;
   hap_link_path_def_init(&path, sizeof path);
   path.delay = 0.03;
   path.jitter = 0.05;
@@ -175,8 +174,9 @@ TEST(momentum_is_kept_over_a_way_that_loses_doubles_and_reorders)
   w->def.max_contacts = 64;
   w->expert.look_ahead = 0.25;
   w->hand_def.friction = 1.0;
-  w->join = lossy_join;
-  cw_start(w, 0.0, 0.0, 0.0585);
+  cw_make(w, 0.0, 0.0, 0.0585);
+  lossy_join(w->session);
+  session_run(w->session);
   for (int64_t i = 0; i < (int64_t)(1e3 * seconds); ++i) {
     cw_move_hand(w, SWING * 2.0 * M_PI * SWING_HZ * cos(2e-3 * M_PI * SWING_HZ * (double)i), 0.0,
                  0.0);

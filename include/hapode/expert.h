@@ -84,12 +84,12 @@ typedef struct hap_expert_def {
    * and ODE's moved callbacks in each part. A joint's feedback is that of the last part. */
   int32_t substeps;
 
-  /* s, 0..HAP_LOOK_AHEAD_MOST, default 0: how much longer than two steps of the world a message may
-   * be on its way from physics to the loop and back. All that is looked for near the hands and their
-   * bodies is looked for so much farther ahead, and the force fades so much later where the world
-   * does not answer. The reach grows by 15 m/s^2 times the square of it, so bodies and contacts need
-   * more room: hap_stats.ahead says what found none. For a world over a network: the round trip and
-   * its jitter. */
+  /* s, 0..HAP_LOOK_AHEAD_MOST, default 0: how much longer than two steps of the world a message
+   * may be on its way from physics to the loop and back. All that is looked for near the hands and
+   * their bodies is looked for so much farther ahead, and the force fades so much later where the
+   * world does not answer. The reach grows by 15 m/s^2 times the square of it, so bodies and
+   * contacts need more room: hap_stats.ahead says what found none. For a world over a network: the
+   * round trip and its jitter (docs/remote.md) */
   double look_ahead;
 } hap_expert_def;
 

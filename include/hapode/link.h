@@ -133,10 +133,10 @@ HAP_NODISCARD HAP_API hap_status hap_link_local_serve(hap_link **out, hap_detail
 
 /* [server's owner] A client's end to a server of hap_link_local_serve. Both ends belong to one
  * thread, and both are polled with the same clock. The client joins with its first poll: then the
- * server hears of it, and answers. name: of the client, at most HAP_LINK_NAME_MOST bytes. up, down: to the server and from
- * it, NULL for the defaults; their delays hold for what is sent from now on. Either end may be
- * closed first. HAP_ERROR_ARGUMENT: server is of another kind, or a number is out of range.
- * HAP_ERROR_STATE: another client of the server has the name. */
+ * server hears of it, and answers. name: of the client, at most HAP_LINK_NAME_MOST bytes. up, down:
+ * to the server and from it, NULL for the defaults. Either end may be closed first.
+ * HAP_ERROR_ARGUMENT: server is of another kind, or a number is out of range. HAP_ERROR_STATE:
+ * another client of the server has the name. */
 HAP_NODISCARD HAP_API hap_status hap_link_local_connect(hap_link *server, const char *name,
                                                         const hap_link_path_def *up,
                                                         const hap_link_path_def *down,

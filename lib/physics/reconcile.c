@@ -228,8 +228,8 @@ static void set_state(const hapi_body_slot *slot, dBodyID body, const hap_pose *
 }
 
 /* A body that the loop has let go since the last message. It did so some ticks after the time that
- * ODE's state is for: back by that, as the step to come goes over the whole interval. A message that
- * was long on its way tells of a time before: on by that. */
+ * ODE's state is for: back by that, as the step to come goes over the whole interval. A message
+ * that was long on its way tells of a time before: on by that. */
 static void take_last_state(const hapi_account *account, const hapi_slot_account *of,
                             const hapi_body_slot *slot, dBodyID body, const hapi_state_body *in)
 {

@@ -103,7 +103,7 @@ void hapi_session_free(hap_session *session)
   }
   hapi_physics_destroy(session->physics);
   hapi_contact_destroy(session->contact);
-  hapi_exchange_destroy(session->world_exchange);
+  hapi_exchange_destroy(session->ferry.exchange);
   if (!stuck) {
     hapi_exchange_destroy(session->exchange);
     hapi_recorder_destroy(session->recorder);
@@ -174,8 +174,8 @@ static hap_status session_begin(hap_session *session, hap_detail *detail)
 {
   int64_t start_ns = session->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : hapi_clock_now();
   hapi_exchange_reset(session->exchange);
-  if (session->world_exchange != NULL) {
-    hapi_exchange_reset(session->world_exchange);
+  if (session->ferry.exchange != NULL) {
+    hapi_exchange_reset(session->ferry.exchange);
   }
   HAPI_TRY(session->player != NULL ? hapi_play_begin(session, &start_ns, detail)
                                    : hapi_record_begin(session, detail));
@@ -392,8 +392,8 @@ static void find_contacts_when_due(hap_session *session)
 /* False: the loop is stopped in this tick's time. */
 static bool tick_runs(const hap_session *session)
 {
-  uint64_t turn = session->run_ticks + session->stop_ticks;
-  return session->stop_ticks == 0 || session->tick % turn < session->run_ticks;
+  uint64_t turn = session->pulses.run_ticks + session->pulses.stop_ticks;
+  return session->pulses.stop_ticks == 0 || session->tick % turn < session->pulses.run_ticks;
 }
 
 hap_status hap_session_advance(hap_session *session, uint64_t ticks)

@@ -26,13 +26,13 @@ hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
     return hapi_session_fail(session, HAP_ERROR_STATE, "the session has been started already");
   }
   HAPI_TRY(far_check(session));
-  if (session->world_exchange == NULL) {
+  if (session->ferry.exchange == NULL) {
     hap_status status =
-        hapi_exchange_create(hapi_exchange_capacity(session->exchange), &session->world_exchange);
+        hapi_exchange_create(hapi_exchange_capacity(session->exchange), &session->ferry.exchange);
     if (status < HAP_OK) {
       return hapi_session_fail(session, status, "no memory for the messages of physics");
     }
-    hapi_physics_set_exchange(session->physics, session->world_exchange);
+    hapi_physics_set_exchange(session->physics, session->ferry.exchange);
   }
   session->ferry = *ferry;
   return HAP_OK;
@@ -62,10 +62,10 @@ static void far_after_tick(void *of, int64_t now_ns)
 
 hap_status hapi_session_set_far(hap_session *session, hapi_far *far)
 {
-  const hapi_ferry ferry = {far, far_before_cycle, far_after_cycle, far_before_tick,
+  const hapi_ferry ferry = {NULL,          far, far_before_cycle, far_after_cycle, far_before_tick,
                             far_after_tick};
   HAPI_TRY(hapi_session_set_ferry(session, &ferry));
-  far->world.exchange = session->world_exchange;
+  far->world.exchange = session->ferry.exchange;
   far->world.terms = (hapi_terms){.look_ahead_s = session->def.expert->look_ahead,
                                   .period_s = 1.0 / session->def.physics_hz};
   far->loop.exchange = session->exchange;

@@ -33,6 +33,7 @@ typedef struct hapi_session_gone {
 /* Carries the messages between physics and the loop where each has an exchange of its own. All are
  * called in drive LOCKSTEP, at the time of the tick. */
 typedef struct hapi_ferry {
+  hapi_exchange *exchange; /* of physics; NULL: it has the loop's, and nothing is carried */
   void *of;
   void (*before_cycle)(void *of, int64_t now_ns); /* the loop's newest state to physics */
   void (*after_cycle)(void *of, int64_t now_ns);  /* model and near away from physics */
@@ -40,12 +41,17 @@ typedef struct hapi_ferry {
   void (*after_tick)(void *of, int64_t now_ns);   /* the state away from the loop */
 } hapi_ferry;
 
+/* For tests and the bench: after run_ticks, stop_ticks are left out; 0: none. */
+typedef struct hapi_pulses {
+  uint32_t run_ticks;
+  uint32_t stop_ticks;
+} hapi_pulses;
+
 struct hap_session {
   hap_session_def def; /* its expert and research are the next two */
   hap_expert_def expert;
   hap_research_def research;
-  hapi_exchange *exchange;       /* of the loop, and of physics where there is no other */
-  hapi_exchange *world_exchange; /* of physics, with a ferry; else NULL */
+  hapi_exchange *exchange; /* of the loop, and of physics where there is no other */
   hapi_ferry ferry;
   hapi_haptic *haptic;
   hapi_textures *textures;
@@ -61,9 +67,7 @@ struct hap_session {
   uint64_t step;
   uint64_t pass_tick; /* of the next one of the contact thread's part */
 
-  /* LOCKSTEP, for tests and the bench: after run_ticks, stop_ticks are left out; 0: none */
-  uint32_t run_ticks;
-  uint32_t stop_ticks;
+  hapi_pulses pulses; /* LOCKSTEP */
 
   double frame_remainder_s; /* FRAME */
   pthread_t starter;        /* thread of the last start */
