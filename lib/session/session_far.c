@@ -26,15 +26,14 @@ hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
     return hapi_session_fail(session, HAP_ERROR_STATE, "the session has been started already");
   }
   HAPI_TRY(far_check(session));
-  if (session->ferry.exchange == NULL) {
-    hap_status status =
-        hapi_exchange_create(hapi_exchange_capacity(session->exchange), &session->ferry.exchange);
-    if (status < HAP_OK) {
-      return hapi_session_fail(session, status, "no memory for the messages of physics");
-    }
-    hapi_physics_set_exchange(session->physics, session->ferry.exchange);
+  hapi_exchange *exchange = session->ferry.exchange;
+  if (exchange == NULL &&
+      hapi_exchange_create(hapi_exchange_capacity(session->exchange), &exchange) < HAP_OK) {
+    return hapi_session_fail(session, HAP_ERROR_MEMORY, "no memory for the messages of physics");
   }
+  hapi_physics_set_exchange(session->physics, exchange);
   session->ferry = *ferry;
+  session->ferry.exchange = exchange;
   return HAP_OK;
 }
 
