@@ -91,7 +91,7 @@ static hap_status apart_join(void *user, hap_session *session)
   }
   run->far = (hapi_far){.world = {.end = {.link = run->server, .codec = codecs[0]}},
                         .loop = {.end = {.link = run->client, .codec = codecs[1]}}};
-  return hapi_session_set_far(session, &run->far);
+  return hapi_session_set_far(session, HAPI_SIDE_BOTH, &run->far);
 }
 
 static void figures_take(remote_run *run, double seconds, const accuracy_motion *motion)
@@ -131,6 +131,7 @@ hap_status remote_apart(bench *b, remote_run *run, accuracy_motion *out)
   if (status >= HAP_OK) {
     figures_take(run, def.seconds, out);
   }
+  hapi_far_finish(&run->far);
   run->codecs->close(run->codecs->user);
   hap_link_close(run->client);
   hap_link_close(run->server);

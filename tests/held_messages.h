@@ -100,8 +100,11 @@ static inline void held_after_tick(void *of, int64_t now_ns)
 /* Before the session starts; *h outlives it. */
 static inline hap_status held_begin(held_messages *h, hap_session *session, double delay_s)
 {
-  const hapi_ferry ferry = {
-      NULL, h, held_before_cycle, held_after_cycle, held_before_tick, held_after_tick};
+  const hapi_ferry ferry = {.of = h,
+                            .before_cycle = held_before_cycle,
+                            .after_cycle = held_after_cycle,
+                            .before_tick = held_before_tick,
+                            .after_tick = held_after_tick};
   hap_status status = hapi_session_set_ferry(session, &ferry);
   if (status < HAP_OK) {
     return status;

@@ -135,9 +135,17 @@ static inline bool raw_give(void *self, void *const messages[2])
   return true;
 }
 
+static inline void raw_reset(void *self)
+{
+  raw_codec *c = self;
+  c->sent = c->given = 0;
+  memset(c->parts[0], 0, RAW_KEPT * sizeof *c->parts[0]);
+  memset(c->parts[1], 0, RAW_KEPT * sizeof *c->parts[1]);
+}
+
 static inline hapi_codec raw_codec_of(raw_codec *c)
 {
-  return (hapi_codec){c, raw_send, raw_take, raw_give};
+  return (hapi_codec){c, raw_send, raw_take, raw_give, raw_reset};
 }
 
 static inline void raw_finish(raw_codec *c)

@@ -155,7 +155,7 @@ static void lossy_join(hap_session *session)
   REQUIRE(pair_open(&pair, session->exchange, codecs) == HAP_OK);
   far_ends = (hapi_far){.world = {.end = {.link = far_links[0], .codec = codecs[0]}},
                         .loop = {.end = {.link = far_links[1], .codec = codecs[1]}}};
-  REQUIRE(hapi_session_set_far(session, &far_ends) == HAP_OK);
+  REQUIRE(hapi_session_set_far(session, HAPI_SIDE_BOTH, &far_ends) == HAP_OK);
 }
 
 /* The hand rubs a cube to and fro between two others. The loop has room for one of the three: of
@@ -191,6 +191,7 @@ TEST(momentum_is_kept_over_a_way_that_loses_doubles_and_reorders)
   CHECK(stats.hand.momentum_error_ns <= 1e-9 * stats.hand.impulse_abs_ns);
   CHECK(stats.faults.states_rejected == 0);
   tap_release(w);
+  hapi_far_finish(&far_ends);
   hap_link_close(far_links[0]);
   hap_link_close(far_links[1]);
   pair_close(&pair);

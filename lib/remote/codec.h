@@ -27,6 +27,7 @@ typedef struct hapi_codec {
   hap_status (*take)(void *self, const hap_link_event *event, hap_detail *detail);
   /* Fills in a whole sync that is newer than the last one given; false: there is none. */
   bool (*give)(void *self, void *const messages[2]);
+  void (*reset)(void *self); /* another peer: nothing is known of it */
 } hapi_codec;
 
 #endif

@@ -8,6 +8,9 @@
 #include "base/assert.h"
 #include "base/log.h"
 
+/* A peer that floods takes this much time of a cycle and no more. */
+#define POLLS_MOST 4096u
+
 void hapi_end_refuse(hapi_end *end, const hap_detail *why)
 {
   if (end->refused++ == 0) { /* a peer that floods must not flood the log */
@@ -18,9 +21,13 @@ void hapi_end_refuse(hapi_end *end, const hap_detail *why)
 
 void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of)
 {
-  hap_link_event event;
-  hap_status status;
-  while ((status = hap_link_poll(end->link, end->now_ns, &event, sizeof event)) == HAP_OK) {
+  hap_link_event event = {.kind = HAP_LINK_MESSAGE};
+  hap_status status = HAP_OK;
+  for (uint32_t i = 0; i < POLLS_MOST && event.kind != HAP_LINK_LEFT; ++i) {
+    status = hap_link_poll(end->link, end->now_ns, &event, sizeof event);
+    if (status != HAP_OK) {
+      break;
+    }
     bool theirs = event.kind == HAP_LINK_MESSAGE && end->joined && event.peer == end->peer;
     hap_detail why = {""};
     if (event.kind == HAP_LINK_MESSAGE && !theirs) {

@@ -29,7 +29,8 @@ typedef struct hapi_end {
  * message of HAPI_TERMS_CHANNEL has come. */
 typedef void (*hapi_end_hear)(void *of, const hap_link_event *event);
 
-/* Takes all that has come in: the peer's messages to the codec, other events to hear. */
+/* Takes what has come in: the peer's messages to the codec, other events to hear. The rest waits
+ * for the next call when a peer has left, and when there is very much. */
 void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of);
 /* Encodes and sends, where there is a peer. */
 void hapi_end_send(hapi_end *end, void *const messages[2]);

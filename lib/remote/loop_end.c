@@ -15,9 +15,14 @@ static void loop_hear(void *of, const hap_link_event *event)
     loop->end.peer = event->peer;
   } else if (event->kind == HAP_LINK_LEFT) {
     loop->end.joined = loop->agreed = false;
-  } else if (hapi_terms_read(event->data, event->bytes, &loop->terms, &why) < HAP_OK) {
-    hapi_end_refuse(&loop->end, &why);
   } else {
+    hapi_terms terms;
+    if (hapi_terms_read(event->data, event->bytes, &terms, &why) < HAP_OK ||
+        hapi_terms_compare(&loop->terms, &terms, &why) < HAP_OK) {
+      hapi_end_refuse(&loop->end, &why);
+      return;
+    }
+    loop->terms = terms;
     loop->agreed = true;
     loop->next_ns = loop->end.now_ns;
   }

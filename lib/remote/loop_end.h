@@ -12,11 +12,11 @@
 typedef struct hapi_loop_end {
   hapi_end end;
   hapi_exchange *exchange; /* of the loop */
-  bool agreed;             /* terms have come */
-  hapi_terms terms;
-  uint64_t number; /* of the newest model given */
-  uint64_t old;    /* models that came behind a newer one */
-  int64_t next_ns; /* when the state is due */
+  bool agreed;             /* terms have come, and are good */
+  hapi_terms terms;        /* before: what the loop has */
+  uint64_t number;         /* of the newest model given */
+  uint64_t old;            /* models that came behind a newer one */
+  int64_t next_ns;         /* when the state is due */
 } hapi_loop_end;
 
 /* Between ticks: a newer model and its pairs to the loop and the contact thread. */

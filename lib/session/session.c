@@ -170,6 +170,16 @@ static void ferry_call(const hap_session *session, void (*call)(void *of, int64_
   }
 }
 
+static bool has_loop(const hap_session *session)
+{
+  return session->ferry.side != HAPI_SIDE_WORLD;
+}
+
+static bool has_world(const hap_session *session)
+{
+  return session->ferry.side != HAPI_SIDE_LOOP;
+}
+
 static hap_status session_begin(hap_session *session, hap_detail *detail)
 {
   int64_t start_ns = session->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : hapi_clock_now();
@@ -179,15 +189,21 @@ static hap_status session_begin(hap_session *session, hap_detail *detail)
   }
   HAPI_TRY(session->player != NULL ? hapi_play_begin(session, &start_ns, detail)
                                    : hapi_record_begin(session, detail));
-  HAPI_TRY(hapi_haptic_begin(session->haptic, start_ns, detail));
-  HAPI_TRY(hapi_physics_begin(session->physics, &start_ns, detail));
-  ferry_call(session, session->ferry.after_cycle, start_ns);
+  if (has_loop(session)) {
+    HAPI_TRY(hapi_haptic_begin(session->haptic, start_ns, detail));
+  }
+  if (has_world(session)) {
+    HAPI_TRY(hapi_physics_begin(session->physics, &start_ns, detail));
+    ferry_call(session, session->ferry.after_cycle, start_ns);
+  }
   /* The first local model, and the first contacts: the first tick has both. */
-  hapi_haptic_set_start(session->haptic, start_ns);
-  hapi_contact_begin(session->contact, start_ns);
-  hapi_haptic_receive(session->haptic, start_ns);
-  hapi_contact_pass(session->contact, start_ns);
-  hapi_haptic_receive(session->haptic, start_ns);
+  if (has_loop(session)) {
+    hapi_haptic_set_start(session->haptic, start_ns);
+    hapi_contact_begin(session->contact, start_ns);
+    hapi_haptic_receive(session->haptic, start_ns);
+    hapi_contact_pass(session->contact, start_ns);
+    hapi_haptic_receive(session->haptic, start_ns);
+  }
   atomic_store(&session->tick, 0);
   session->base = session->step = session->pass_tick = 0;
   session->frame_remainder_s = 0.0;
@@ -416,17 +432,21 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
   }
   for (uint64_t i = 0; i < ticks; ++i) {
     int64_t now = time_of(session, session->tick);
-    bool runs = tick_runs(session);
+    bool runs = has_loop(session) && tick_runs(session);
     if (runs) {
       ferry_call(session, session->ferry.before_tick, now);
       hapi_haptic_receive(session->haptic, now);
     }
-    step_when_due(session);
-    find_contacts_when_due(session);
+    if (has_world(session)) {
+      step_when_due(session);
+    }
+    if (has_loop(session)) {
+      find_contacts_when_due(session);
+    }
     if (runs) {
       hapi_haptic_cycle(session->haptic, now);
       ferry_call(session, session->ferry.after_tick, now);
-    } else {
+    } else if (has_loop(session)) {
       hapi_haptic_count_missed(session->haptic, 1);
     }
     atomic_fetch_add_explicit(&session->tick, 1, memory_order_relaxed);

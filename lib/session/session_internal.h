@@ -32,7 +32,14 @@ typedef struct hapi_session_gone {
 
 /* Carries the messages between physics and the loop where each has an exchange of its own. All are
  * called in drive LOCKSTEP, at the time of the tick. */
+typedef enum hapi_side {
+  HAPI_SIDE_BOTH,
+  HAPI_SIDE_WORLD, /* the session has no loop: physics alone runs */
+  HAPI_SIDE_LOOP   /* the session has no world: loop and contact thread alone run */
+} hapi_side;
+
 typedef struct hapi_ferry {
+  hapi_side side;
   hapi_exchange *exchange; /* of physics; NULL: it has the loop's, and nothing is carried */
   void *of;
   void (*before_cycle)(void *of, int64_t now_ns); /* the loop's newest state to physics */
@@ -107,14 +114,17 @@ void hapi_session_free(hap_session *session);
  * application that is asked about contacts. */
 hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry);
 
-/* A world's end and a loop's end in one process. The caller fills in links and codecs. */
+/* A session's part of a world and a loop that are far from each other: of one side, or of both for
+ * tests. The caller fills in links and codecs. */
 typedef struct hapi_far {
   hapi_world_end world;
   hapi_loop_end loop;
 } hapi_far;
 
-/* The two ends as the session's ferry; *far outlives the session. Errors as above. */
-hap_status hapi_session_set_far(hap_session *session, hapi_far *far);
+/* The ends of that side as the session's ferry. *far outlives the session; finish comes after it.
+ * Errors as above, and HAP_ERROR_MEMORY. */
+hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
+void hapi_far_finish(hapi_far *far); /* zeroed allowed */
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */
