@@ -79,7 +79,8 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
   far->world.renew = far_renew;
   far->world.renew_of = session->physics;
   far->loop.exchange = session->exchange;
-  return session->ferry.side != HAPI_SIDE_LOOP ? hapi_world_end_begin(&far->world) : HAP_OK;
+  HAPI_TRY(hapi_world_end_begin(&far->world));
+  return hapi_loop_end_begin(&far->loop);
 }
 
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far)
@@ -103,4 +104,5 @@ hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *
 void hapi_far_finish(hapi_far *far)
 {
   hapi_world_end_finish(&far->world);
+  hapi_loop_end_finish(&far->loop);
 }
