@@ -56,6 +56,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "memory_and_log": "docs/faults.md",
     "plot_a_trace": "docs/programs.md",
     "servo_loop": "docs/from-chai3d.md",
+    "lossy_link": "docs/remote.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -111,6 +112,12 @@ def check_edit_while_running(program):
     out = run(program)
     said = re.match(r"3 cubes made anew, 0 lost; at most ([0-9.]+) N", out)
     point(said is not None and float(said.group(1)) > 0.2, "the hand feels what is edited", out)
+
+
+def check_lossy_link(program):
+    out = run(program)
+    said = re.search(r"1010 sent; came: (\d+) newest, 10 reliable; 1 left", out)
+    point(said is not None and 960 < int(said.group(1)) < 990, "one in twenty is lost", out)
 
 
 def check_make_touchable(program):

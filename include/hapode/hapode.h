@@ -15,6 +15,7 @@
 #include <hapode/grab.h>
 #include <hapode/hooks.h>
 #include <hapode/identify.h>
+#include <hapode/link.h>
 #include <hapode/outputs.h>
 #include <hapode/pointer.h>
 #include <hapode/pointer_set.h>

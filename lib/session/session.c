@@ -103,6 +103,7 @@ void hapi_session_free(hap_session *session)
   }
   hapi_physics_destroy(session->physics);
   hapi_contact_destroy(session->contact);
+  hapi_exchange_destroy(session->ferry.exchange);
   if (!stuck) {
     hapi_exchange_destroy(session->exchange);
     hapi_recorder_destroy(session->recorder);
@@ -161,20 +162,48 @@ static hap_status start_threads(hap_session *session)
   return wanted && !given ? HAP_NO_REALTIME : HAP_OK;
 }
 
+static void ferry_call(const hap_session *session, void (*call)(void *of, int64_t now_ns),
+                       int64_t now_ns)
+{
+  if (call != NULL) {
+    call(session->ferry.of, now_ns);
+  }
+}
+
+static bool has_loop(const hap_session *session)
+{
+  return session->ferry.side != HAPI_SIDE_WORLD;
+}
+
+static bool has_world(const hap_session *session)
+{
+  return session->ferry.side != HAPI_SIDE_LOOP;
+}
+
 static hap_status session_begin(hap_session *session, hap_detail *detail)
 {
   int64_t start_ns = session->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : hapi_clock_now();
   hapi_exchange_reset(session->exchange);
+  if (session->ferry.exchange != NULL) {
+    hapi_exchange_reset(session->ferry.exchange);
+  }
   HAPI_TRY(session->player != NULL ? hapi_play_begin(session, &start_ns, detail)
                                    : hapi_record_begin(session, detail));
-  HAPI_TRY(hapi_haptic_begin(session->haptic, start_ns, detail));
-  HAPI_TRY(hapi_physics_begin(session->physics, &start_ns, detail));
+  if (has_loop(session)) {
+    HAPI_TRY(hapi_haptic_begin(session->haptic, start_ns, detail));
+  }
+  if (has_world(session)) {
+    HAPI_TRY(hapi_physics_begin(session->physics, &start_ns, detail));
+    ferry_call(session, session->ferry.after_cycle, start_ns);
+  }
   /* The first local model, and the first contacts: the first tick has both. */
-  hapi_haptic_set_start(session->haptic, start_ns);
-  hapi_contact_begin(session->contact, start_ns);
-  hapi_haptic_receive(session->haptic, start_ns);
-  hapi_contact_pass(session->contact, start_ns);
-  hapi_haptic_receive(session->haptic, start_ns);
+  if (has_loop(session)) {
+    hapi_haptic_set_start(session->haptic, start_ns);
+    hapi_contact_begin(session->contact, start_ns);
+    hapi_haptic_receive(session->haptic, start_ns);
+    hapi_contact_pass(session->contact, start_ns);
+    hapi_haptic_receive(session->haptic, start_ns);
+  }
   atomic_store(&session->tick, 0);
   session->base = session->step = session->pass_tick = 0;
   session->frame_remainder_s = 0.0;
@@ -351,7 +380,9 @@ static void step_when_due(hap_session *session)
   int64_t now = time_of(session, session->base) + seconds_in_ns((double)session->step * period);
   /* SINGLE steps up to now, and at the start there is nothing to step. */
   if (session->tick > 0 || !hapi_physics_steps_to_now(session->physics)) {
+    ferry_call(session, session->ferry.before_cycle, now);
     hapi_physics_cycle(session->physics, now, now + seconds_in_ns(next_period));
+    ferry_call(session, session->ferry.after_cycle, now);
   }
   session->base = changes ? session->tick : session->base;
   session->step = changes ? 1 : session->step + 1;
@@ -377,8 +408,8 @@ static void find_contacts_when_due(hap_session *session)
 /* False: the loop is stopped in this tick's time. */
 static bool tick_runs(const hap_session *session)
 {
-  uint64_t turn = session->run_ticks + session->stop_ticks;
-  return session->stop_ticks == 0 || session->tick % turn < session->run_ticks;
+  uint64_t turn = session->pulses.run_ticks + session->pulses.stop_ticks;
+  return session->pulses.stop_ticks == 0 || session->tick % turn < session->pulses.run_ticks;
 }
 
 hap_status hap_session_advance(hap_session *session, uint64_t ticks)
@@ -401,15 +432,21 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
   }
   for (uint64_t i = 0; i < ticks; ++i) {
     int64_t now = time_of(session, session->tick);
-    bool runs = tick_runs(session);
+    bool runs = has_loop(session) && tick_runs(session);
     if (runs) {
+      ferry_call(session, session->ferry.before_tick, now);
       hapi_haptic_receive(session->haptic, now);
     }
-    step_when_due(session);
-    find_contacts_when_due(session);
+    if (has_world(session)) {
+      step_when_due(session);
+    }
+    if (has_loop(session)) {
+      find_contacts_when_due(session);
+    }
     if (runs) {
       hapi_haptic_cycle(session->haptic, now);
-    } else {
+      ferry_call(session, session->ferry.after_tick, now);
+    } else if (has_loop(session)) {
       hapi_haptic_count_missed(session->haptic, 1);
     }
     atomic_fetch_add_explicit(&session->tick, 1, memory_order_relaxed);

@@ -28,6 +28,8 @@ LAYERS = {
     "lib/proximity": ["lib/base"],
     "lib/wire": ["lib/base", "lib/sync", "lib/proximity"],
     "lib/device": ["lib/base"],
+    "lib/link": ["lib/base"],
+    "lib/remote": ["lib/base", "lib/sync"],
     "lib/solver": ["lib/base"],
     "lib/pointer": ["lib/base", "lib/sync"],
     "lib/local": ["lib/base", "lib/sync", "lib/proximity", "lib/solver", "lib/pointer"],
