@@ -26,6 +26,7 @@ LAYERS = {
     "lib/base": [],
     "lib/sync": ["lib/base", "lib/proximity"],
     "lib/proximity": ["lib/base"],
+    "lib/wire": ["lib/base", "lib/sync", "lib/proximity"],
     "lib/device": ["lib/base"],
     "lib/link": ["lib/base"],
     "lib/remote": ["lib/base", "lib/sync"],
