@@ -396,12 +396,12 @@ static int64_t offset_of(const int64_t (*ways)[2], uint32_t count, int64_t *out_
 {
   const int64_t ahead_ns = 5000 * MS;
   hapi_stamps stamps = {.count = 0};
-  unsigned char question[HAPI_STAMPS_BYTES];
-  unsigned char answer[HAPI_STAMPS_BYTES];
+  unsigned char question[HAPI_STAMPS_QUESTION];
+  unsigned char answer[HAPI_STAMPS_ANSWER];
   for (uint32_t i = 0; i < count; ++i) {
-    int64_t now_ns = (i + 1) * 100 * MS;
+    int64_t now_ns = (i + 1) * 300 * MS;
     REQUIRE(hapi_stamps_ask(&stamps, now_ns, question));
-    CHECK(!hapi_stamps_ask(&stamps, now_ns + MS, answer));
+    CHECK(!hapi_stamps_ask(&stamps, now_ns + MS, question));
     REQUIRE(hapi_stamps_answer(question, sizeof question, now_ns + ways[i][0] + ahead_ns, answer));
     REQUIRE(hapi_stamps_take(&stamps, answer, sizeof answer, now_ns + ways[i][0] + ways[i][1]));
   }
@@ -429,8 +429,8 @@ TEST(the_clocks_are_compared_by_the_fastest_of_sixteen_answers)
 TEST(answers_that_cannot_be_true_are_refused)
 {
   hapi_stamps stamps = {.count = 0};
-  unsigned char question[HAPI_STAMPS_BYTES];
-  unsigned char answer[HAPI_STAMPS_BYTES];
+  unsigned char question[HAPI_STAMPS_QUESTION];
+  unsigned char answer[HAPI_STAMPS_ANSWER];
   REQUIRE(hapi_stamps_ask(&stamps, 1000 * MS, question));
   CHECK(!hapi_stamps_answer(question, sizeof question - 1, 0, answer));
   REQUIRE(hapi_stamps_answer(question, sizeof question, 7, answer));

@@ -77,10 +77,10 @@ void hapi_end_send(hapi_end *end, void *const messages[2])
   }
 }
 
-void hapi_end_send_stamps(hapi_end *end, const unsigned char bytes[HAPI_STAMPS_BYTES])
+void hapi_end_send_stamps(hapi_end *end, const unsigned char *data, uint32_t bytes)
 {
   const hap_link_parcel parcel = {
-      .to = {.channel = HAPI_STAMPS_CHANNEL}, .bytes = HAPI_STAMPS_BYTES, .data = bytes};
+      .to = {.channel = HAPI_STAMPS_CHANNEL}, .bytes = bytes, .data = data};
   (void)end_post(end, &parcel);
 }
 

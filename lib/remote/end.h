@@ -36,7 +36,7 @@ void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of);
 /* Encodes and sends, where there is a peer. */
 void hapi_end_send(hapi_end *end, void *const messages[2]);
 void hapi_end_send_terms(hapi_end *end, const hapi_terms *terms);
-void hapi_end_send_stamps(hapi_end *end, const unsigned char bytes[HAPI_STAMPS_BYTES]);
+void hapi_end_send_stamps(hapi_end *end, const unsigned char *data, uint32_t bytes);
 /* Counts what hear has not understood. */
 void hapi_end_refuse(hapi_end *end, const hap_detail *why);
 

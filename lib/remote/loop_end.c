@@ -101,10 +101,10 @@ void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns)
 
 void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns)
 {
-  unsigned char question[HAPI_STAMPS_BYTES];
+  unsigned char question[HAPI_STAMPS_QUESTION];
   loop->end.now_ns = now_ns;
   if (loop->agreed && hapi_stamps_ask(&loop->stamps, now_ns, question)) {
-    hapi_end_send_stamps(&loop->end, question);
+    hapi_end_send_stamps(&loop->end, question, sizeof question);
   }
   if (!loop->agreed || now_ns < loop->next_ns) {
     return;

@@ -7,30 +7,30 @@
 #include "base/assert.h"
 #include "remote/bytes.h"
 
-#define ASK_NS 37000000LL     /* no multiple of a usual period of physics */
-#define ASK_SOON_NS 5300000LL /* until there are a few answers */
+#define ASK_NS 237000000LL    /* no multiple of a usual period of physics */
+#define ASK_SOON_NS 5300000LL /* the first ones */
 #define TRIP_MOST_NS 10000000000LL
 
-/* The message: when it was asked (loop's clock), found and answered (world's). */
+/* The answer: when it was asked (loop's clock), found and answered (world's). A question is the
+ * first of them. */
 
-bool hapi_stamps_ask(hapi_stamps *stamps, int64_t now_ns, unsigned char out[HAPI_STAMPS_BYTES])
+bool hapi_stamps_ask(hapi_stamps *stamps, int64_t now_ns, unsigned char out[HAPI_STAMPS_QUESTION])
 {
   if (now_ns < stamps->next_ns) {
     return false;
   }
-  stamps->next_ns = now_ns + (stamps->count < HAPI_STAMPS_KEPT ? ASK_SOON_NS : ASK_NS);
-  memset(out, 0, HAPI_STAMPS_BYTES);
+  stamps->next_ns = now_ns + (++stamps->asked < HAPI_STAMPS_KEPT ? ASK_SOON_NS : ASK_NS);
   hapi_bytes_write((uint64_t)now_ns, 8, out);
   return true;
 }
 
 bool hapi_stamps_answer(const void *data, uint32_t bytes, int64_t now_ns,
-                        unsigned char out[HAPI_STAMPS_BYTES])
+                        unsigned char out[HAPI_STAMPS_ANSWER])
 {
-  if (bytes != HAPI_STAMPS_BYTES) {
+  if (bytes != HAPI_STAMPS_QUESTION) {
     return false;
   }
-  memcpy(out, data, HAPI_STAMPS_BYTES);
+  memcpy(out, data, HAPI_STAMPS_QUESTION);
   hapi_bytes_write((uint64_t)now_ns, 8, out + 8);
   hapi_bytes_write((uint64_t)now_ns, 8, out + 16);
   return true;
@@ -39,7 +39,7 @@ bool hapi_stamps_answer(const void *data, uint32_t bytes, int64_t now_ns,
 bool hapi_stamps_take(hapi_stamps *stamps, const void *data, uint32_t bytes, int64_t now_ns)
 {
   const unsigned char *in = data;
-  if (bytes != HAPI_STAMPS_BYTES) {
+  if (bytes != HAPI_STAMPS_ANSWER) {
     return false;
   }
   /* Unsigned, as clocks of others may be anything. */

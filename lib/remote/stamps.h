@@ -12,22 +12,24 @@
 #include <stdint.h>
 
 #define HAPI_STAMPS_CHANNEL 4u
-#define HAPI_STAMPS_BYTES 24u
+#define HAPI_STAMPS_QUESTION 8u /* bytes */
+#define HAPI_STAMPS_ANSWER 24u  /* bytes */
 #define HAPI_STAMPS_KEPT 16u
 
 typedef struct hapi_stamps {
   int64_t offset_ns[HAPI_STAMPS_KEPT];
   int64_t trip_ns[HAPI_STAMPS_KEPT];
   uint32_t count;  /* answers so far */
+  uint32_t asked;  /* questions so far */
   int64_t next_ns; /* when the next question is due */
 } hapi_stamps;
 
 /* [loop] A question, when it is due; false: not yet. */
-bool hapi_stamps_ask(hapi_stamps *stamps, int64_t now_ns, unsigned char out[HAPI_STAMPS_BYTES]);
+bool hapi_stamps_ask(hapi_stamps *stamps, int64_t now_ns, unsigned char out[HAPI_STAMPS_QUESTION]);
 /* [world] The answer to a question that has been found at now_ns, and goes at once. False: it is
  * none. */
 bool hapi_stamps_answer(const void *data, uint32_t bytes, int64_t now_ns,
-                        unsigned char out[HAPI_STAMPS_BYTES]);
+                        unsigned char out[HAPI_STAMPS_ANSWER]);
 /* [loop] Takes an answer. False: it is none, or cannot be true. */
 bool hapi_stamps_take(hapi_stamps *stamps, const void *data, uint32_t bytes, int64_t now_ns);
 /* [loop] World's clock - loop's; *out_trip_ns: round trip of that answer. Some answer has come. */
