@@ -107,6 +107,7 @@ static hap_status shifted_poll(void *self, int64_t now_ns, hap_link_event *out, 
 {
   shifted *s = self;
   hap_status status = hap_link_poll(s->inner, now_ns + s->ahead_ns, out, sizeof *out);
+  out->arrived_ns -= status == HAP_OK ? s->ahead_ns : 0;
   (void)hap_link_detail(s->inner, detail);
   return status;
 }
@@ -402,8 +403,11 @@ static int64_t offset_of(const int64_t (*ways)[2], uint32_t count, int64_t *out_
     int64_t now_ns = (i + 1) * 300 * MS;
     REQUIRE(hapi_stamps_ask(&stamps, now_ns, question));
     CHECK(!hapi_stamps_ask(&stamps, now_ns + MS, question));
-    REQUIRE(hapi_stamps_answer(question, sizeof question, now_ns + ways[i][0] + ahead_ns, answer));
-    REQUIRE(hapi_stamps_take(&stamps, answer, sizeof answer, now_ns + ways[i][0] + ways[i][1]));
+    const int64_t found_ns = now_ns + ways[i][0] + ahead_ns; /* and 3 ms until the answer goes */
+    const int64_t times_ns[2] = {found_ns, found_ns + 3 * MS};
+    REQUIRE(hapi_stamps_answer(question, sizeof question, times_ns, answer));
+    REQUIRE(hapi_stamps_take(&stamps, answer, sizeof answer,
+                             now_ns + ways[i][0] + ways[i][1] + 3 * MS));
   }
   return hapi_stamps_offset(&stamps, out_trip_ns) - ahead_ns;
 }
@@ -432,8 +436,9 @@ TEST(answers_that_cannot_be_true_are_refused)
   unsigned char question[HAPI_STAMPS_QUESTION];
   unsigned char answer[HAPI_STAMPS_ANSWER];
   REQUIRE(hapi_stamps_ask(&stamps, 1000 * MS, question));
-  CHECK(!hapi_stamps_answer(question, sizeof question - 1, 0, answer));
-  REQUIRE(hapi_stamps_answer(question, sizeof question, 7, answer));
+  const int64_t times_ns[2] = {7, 7};
+  CHECK(!hapi_stamps_answer(question, sizeof question - 1, times_ns, answer));
+  REQUIRE(hapi_stamps_answer(question, sizeof question, times_ns, answer));
   CHECK(!hapi_stamps_take(&stamps, answer, sizeof answer - 1, 1010 * MS));
   CHECK(!hapi_stamps_take(&stamps, answer, sizeof answer, 990 * MS));   /* before it was asked */
   CHECK(!hapi_stamps_take(&stamps, answer, sizeof answer, 12000 * MS)); /* of another life */

@@ -57,7 +57,7 @@ static void loop_hear(void *of, const hap_link_event *event)
   } else if (event->kind == HAP_LINK_LEFT) {
     loop->end.joined = loop->agreed = false;
   } else if (event->channel == HAPI_STAMPS_CHANNEL) {
-    if (!hapi_stamps_take(&loop->stamps, event->data, event->bytes, loop->end.now_ns)) {
+    if (!hapi_stamps_take(&loop->stamps, event->data, event->bytes, event->arrived_ns)) {
       snprintf(why.text, sizeof why.text, "it is no answer about the time");
       hapi_end_refuse(&loop->end, &why);
     }

@@ -24,19 +24,19 @@ bool hapi_stamps_ask(hapi_stamps *stamps, int64_t now_ns, unsigned char out[HAPI
   return true;
 }
 
-bool hapi_stamps_answer(const void *data, uint32_t bytes, int64_t now_ns,
+bool hapi_stamps_answer(const void *data, uint32_t bytes, const int64_t times_ns[2],
                         unsigned char out[HAPI_STAMPS_ANSWER])
 {
   if (bytes != HAPI_STAMPS_QUESTION) {
     return false;
   }
   memcpy(out, data, HAPI_STAMPS_QUESTION);
-  hapi_bytes_write((uint64_t)now_ns, 8, out + 8);
-  hapi_bytes_write((uint64_t)now_ns, 8, out + 16);
+  hapi_bytes_write((uint64_t)times_ns[0], 8, out + 8);
+  hapi_bytes_write((uint64_t)times_ns[1], 8, out + 16);
   return true;
 }
 
-bool hapi_stamps_take(hapi_stamps *stamps, const void *data, uint32_t bytes, int64_t now_ns)
+bool hapi_stamps_take(hapi_stamps *stamps, const void *data, uint32_t bytes, int64_t came_ns)
 {
   const unsigned char *in = data;
   if (bytes != HAPI_STAMPS_ANSWER) {
@@ -46,8 +46,8 @@ bool hapi_stamps_take(hapi_stamps *stamps, const void *data, uint32_t bytes, int
   uint64_t asked = hapi_bytes_read(in, 8);
   uint64_t found = hapi_bytes_read(in + 8, 8);
   uint64_t answered = hapi_bytes_read(in + 16, 8);
-  int64_t trip = (int64_t)(((uint64_t)now_ns - asked) - (answered - found));
-  if ((int64_t)asked < 0 || (int64_t)((uint64_t)now_ns - asked) < 0 || trip < 0 ||
+  int64_t trip = (int64_t)(((uint64_t)came_ns - asked) - (answered - found));
+  if ((int64_t)asked < 0 || (int64_t)((uint64_t)came_ns - asked) < 0 || trip < 0 ||
       trip > TRIP_MOST_NS) {
     return false;
   }
