@@ -23,8 +23,9 @@ static const hapi_wire_field model_fields[] = {
     M(NOT, body_count), M(NOT, contact_count), M(NOT, joint_count), M(NOT, tool_count),
     M(NOT, cross_count), M(NOT, course_count), M(NOT, triangle_count), M(NOT, feel_count),
     /* The receiver's own. */
-    M(NOT, bodies_offset), M(NOT, contacts_offset), M(NOT, joints_offset), M(NOT, tools_offset),
-    M(NOT, crosses_offset), M(NOT, courses_offset), M(NOT, triangles_offset), M(NOT, feels_offset)};
+    M(NOT, look_ahead_s), M(NOT, bodies_offset), M(NOT, contacts_offset), M(NOT, joints_offset),
+    M(NOT, tools_offset), M(NOT, crosses_offset), M(NOT, courses_offset), M(NOT, triangles_offset),
+    M(NOT, feels_offset)};
 
 static const hapi_wire_field near_fields[] = {
 #define N(kind, ...) kind(hapi_near, __VA_ARGS__)

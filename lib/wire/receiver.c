@@ -163,6 +163,7 @@ typedef struct datagram {
   uint32_t directory;
   uint32_t chunk;
   uint64_t from;
+  uint32_t count;
   const uint8_t *chunk_at;
   hapi_code_reader records;
 } datagram;
@@ -183,6 +184,7 @@ static bool datagram_read(const hapi_wire_receiver *receiver, const uint8_t *dat
   out->directory = hapi_code_take_most(&r, (uint32_t)receiver->directory_size);
   out->chunk = hapi_code_take_most(&r, HAPI_WIRE_DATAGRAM);
   out->from = hapi_code_take(&r);
+  out->count = hapi_code_take_most(&r, HAPI_WIRE_DATAGRAM);
   if (r.bad || (out->flags & ~(HAPI_WIRE_KEEP | HAPI_WIRE_LAST)) != 0 || out->number == 0 ||
       (back != 0 && back >= out->number) || out->chunk > (size_t)(r.end - r.at) ||
       out->chunk > out->directory || out->from > receiver->records_most) {
@@ -391,7 +393,7 @@ static const char *part_take(const hapi_wire_receiver *receiver, const datagram 
   if (next < *io_next) {
     return "the parts overlap";
   }
-  while (r.at != r.end) {
+  for (uint32_t i = 0; i < d->count; ++i) {
     hapi_wire_kind kind;
     uint64_t gap = hapi_code_take(&r);
     uint64_t *cells = r.bad || gap > receiver->records_most
@@ -411,7 +413,7 @@ static const char *part_take(const hapi_wire_receiver *receiver, const datagram 
     next += gap + 1;
   }
   *io_next = next;
-  return NULL;
+  return r.at == r.end ? NULL : "bytes follow its records";
 }
 
 static const char *parts_take(const hapi_wire_receiver *receiver, const hapi_wire_gathering *g,
@@ -445,34 +447,64 @@ static const char *parts_take(const hapi_wire_receiver *receiver, const hapi_wir
   return NULL;
 }
 
-/* Records of lost datagrams are as they were known last. */
-static outcome frame_mend(const hapi_wire_receiver *receiver, const hapi_wire_frame *base,
-                          const hapi_wire_frame *frame)
+/* What a message is nothing without: heads, hands, and what bodies answer by. */
+static bool kind_is_needed(hapi_wire_kind kind)
 {
-  const hapi_wire_shape *shape = &receiver->shape;
+  return kind == HAPI_WIRE_MODEL || kind == HAPI_WIRE_NEAR || kind == HAPI_WIRE_RESPONSE ||
+         kind == HAPI_WIRE_MEASURED || kind == HAPI_WIRE_STATE || kind == HAPI_WIRE_POINTER;
+}
+
+/* Where a record of a lost datagram is known from. NULL: from nowhere. */
+static const uint64_t *record_known(const hapi_wire_receiver *receiver, const hapi_wire_frame *base,
+                                    const hapi_wire_frame *frame, hapi_wire_kind kind,
+                                    uint32_t place)
+{
   const hapi_wire_frame *last = receiver->last;
-  uint64_t index = 0;
-  for (uint32_t i = shape->first; i < shape->end; ++i) {
-    hapi_wire_kind kind = (hapi_wire_kind)i;
-    for (uint32_t k = 0; k < frame->counts[kind]; ++k, ++index) {
-      if (!receiver->lost[index]) {
-        continue;
-      }
-      uint32_t label = frame->labels[kind][k];
-      uint32_t place = last != NULL ? hapi_wire_place(last, kind, label) : HAPI_WIRE_NOWHERE;
-      if (place != HAPI_WIRE_NOWHERE) {
-        memcpy(hapi_wire_cells_at(frame, shape, kind, k),
-               hapi_wire_cells_at(last, shape, kind, place), shape->cells[kind] * sizeof(uint64_t));
-      } else if (receiver->known[kind] == NULL &&
-                 (base == NULL || hapi_wire_place(base, kind, label) == HAPI_WIRE_NOWHERE)) {
-        return OUTCOME_WAIT; /* nothing is known of it */
-      }
-      if (kind == HAPI_WIRE_MODEL || kind == HAPI_WIRE_NEAR || kind == HAPI_WIRE_STATE) {
-        return OUTCOME_WAIT;
-      }
+  uint32_t label = frame->labels[kind][place];
+  uint32_t in_last = last != NULL ? hapi_wire_place(last, kind, label) : HAPI_WIRE_NOWHERE;
+  if (in_last != HAPI_WIRE_NOWHERE) {
+    return hapi_wire_cells_at(last, &receiver->shape, kind, in_last);
+  }
+  bool begun = receiver->known[kind] != NULL ||
+               (base != NULL && hapi_wire_place(base, kind, label) != HAPI_WIRE_NOWHERE);
+  return begun ? hapi_wire_cells_at(frame, &receiver->shape, kind, place) : NULL;
+}
+
+/* Records of lost datagrams are as they were known last; those of which nothing is known are left
+ * out. False: the frame is nothing without one. */
+static bool list_mend(const hapi_wire_receiver *receiver, const hapi_wire_frame *base,
+                      hapi_wire_frame *frame, hapi_wire_kind kind, const bool *lost)
+{
+  size_t size = receiver->shape.cells[kind] * sizeof(uint64_t);
+  uint32_t count = frame->counts[kind];
+  uint32_t to = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    const uint64_t *from = lost[i] ? record_known(receiver, base, frame, kind, i)
+                                   : hapi_wire_cells_at(frame, &receiver->shape, kind, i);
+    if (from == NULL && kind_is_needed(kind)) {
+      return false;
+    }
+    if (from != NULL) {
+      memmove(hapi_wire_cells_at(frame, &receiver->shape, kind, to), from, size);
+      frame->labels[kind][to] = frame->labels[kind][i];
+      frame->places[kind][frame->labels[kind][i]] = to++;
     }
   }
-  return OUTCOME_GOOD;
+  frame->counts[kind] = to;
+  return true;
+}
+
+static outcome frame_mend(const hapi_wire_receiver *receiver, const hapi_wire_frame *base,
+                          hapi_wire_frame *frame)
+{
+  const bool *lost = receiver->lost;
+  bool good = !lost[0]; /* the head is new, or there is no message */
+  for (uint32_t i = receiver->shape.first; i < receiver->shape.end && good; ++i) {
+    uint32_t count = frame->counts[i];
+    good = list_mend(receiver, base, frame, (hapi_wire_kind)i, lost);
+    lost += count;
+  }
+  return good ? OUTCOME_GOOD : OUTCOME_WAIT;
 }
 
 /* Records that were not changed are those of the base or of descriptions, which were checked. Those

@@ -7,7 +7,7 @@
 #include "base/alloc.h"
 #include "base/assert.h"
 
-#define HEADER_MOST 64u /* bytes of a datagram before directory and records */
+#define HEADER_MOST 88u /* bytes of a datagram before directory and records */
 #define ROOM (HAPI_WIRE_DATAGRAM - HEADER_MOST)
 
 bool hapi_wire_sender_create(hapi_wire_sender *sender, uint32_t channel, uint32_t first,
@@ -273,6 +273,7 @@ typedef struct parcel {
   size_t told;      /* those of them in earlier datagrams */
   size_t chunk;     /* and in this one */
   uint32_t part;
+  uint32_t count;           /* of records in this datagram */
   uint64_t from;            /* first record that the datagram speaks of */
   uint64_t next;            /* the one behind the last that it has told */
   hapi_code_writer records; /* into bytes */
@@ -284,6 +285,7 @@ static void parcel_open(parcel *p)
   size_t left = p->directory - p->told;
   p->chunk = left < ROOM ? left : ROOM;
   p->from = p->next;
+  p->count = 0;
   p->records = (hapi_code_writer){p->bytes, p->bytes + (ROOM - p->chunk), false};
 }
 
@@ -305,6 +307,7 @@ static hap_status parcel_send(parcel *p, bool last)
   hapi_code_put(&w, p->directory);
   hapi_code_put(&w, p->chunk);
   hapi_code_put(&w, p->from);
+  hapi_code_put(&w, p->count);
   HAPI_ASSERT((size_t)(w.at - bytes) <= HEADER_MOST);
   hapi_code_copy(&w, p->sender->directory + p->told, p->chunk);
   hapi_code_copy(&w, p->bytes, (size_t)(p->records.at - p->bytes));
@@ -339,6 +342,7 @@ static hap_status parcel_put(parcel *p, hapi_wire_kind kind, uint64_t index, con
     hapi_wire_delta_put(&p->records, shape->by_xor[kind], shape->cells[kind], before, now);
     if (!p->records.full) {
       p->next = index + 1;
+      ++p->count;
       return HAP_OK;
     }
     p->records.at = begin; /* into the next datagram */

@@ -25,7 +25,7 @@ static uint64_t *state_add(packing *p, hapi_wire_kind kind, uint64_t key, const 
     p->status = cells == NULL ? HAP_ERROR_CAPACITY : HAP_ERROR_ARGUMENT;
     snprintf(p->detail->text, sizeof p->detail->text, "%s %u: %s%s", hapi_wire_records[kind].name,
              p->sender->now->counts[kind], bad != NULL ? bad : "there is no room for it",
-             bad != NULL ? " is not finite, out of range, or no unit quaternion" : "");
+             bad != NULL ? " is not finite or out of range" : "");
   }
   return cells;
 }

@@ -58,7 +58,7 @@ static void pack_bad(packing *p, hapi_wire_kind kind, const char *member)
 {
   if (member != NULL && p->status >= HAP_OK) {
     char why[128];
-    snprintf(why, sizeof why, "%s is not finite, out of range, or no unit quaternion", member);
+    snprintf(why, sizeof why, "%s is not finite or out of range", member);
     pack_refuse(p, HAP_ERROR_ARGUMENT, kind, why);
   }
 }
