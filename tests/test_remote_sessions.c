@@ -17,7 +17,7 @@
 
 #define MS 1000000LL
 
-/* ---- datagrams: a transport that knows the headers alone; what is sent on loopback arrives ---- */
+/* ---- datagrams: a transport that knows the headers alone; on loopback all of them arrive ---- */
 
 #define CABLE_HEAD 5 /* what it is, channel, part, reliable; and JOIN and LEAVE for the other end */
 #define CABLE_MESSAGE 0

@@ -7,7 +7,7 @@
  * world, with a link between them (docs/remote.md). Model CONTACT. One hand's session at a time.
  *
  * Both sessions have the same max_bodies, max_contacts, max_pointers, max_hull_points and
- * haptic_hz. The world's session has look_ahead (hapode/expert.h): the round trip and its jitter. */
+ * haptic_hz. hap_expert_def.look_ahead of the world's is the round trip and its jitter. */
 
 #include <stddef.h>
 #include <stdint.h>

@@ -104,7 +104,9 @@ void hapi_session_free(hap_session *session)
   hapi_physics_destroy(session->physics);
   hapi_contact_destroy(session->contact);
   hapi_exchange_destroy(session->ferry.exchange);
-  hapi_session_free_far(session);
+  if (session->ferry.free != NULL) {
+    session->ferry.free(session);
+  }
   if (!stuck) {
     hapi_exchange_destroy(session->exchange);
     hapi_recorder_destroy(session->recorder);
@@ -175,7 +177,7 @@ static hap_status threads_run(hap_session *session, const char **out_which)
     HAPI_TRY(hapi_contact_start_thread(session->contact));
   }
   *out_which = "network";
-  return has_world(session) ? HAP_OK : hapi_session_start_network(session);
+  return session->ferry.start != NULL ? session->ferry.start(session) : HAP_OK;
 }
 
 static hap_status start_threads(hap_session *session)
@@ -271,7 +273,9 @@ hap_status hap_session_stop(hap_session *session)
   }
   bool ended = hapi_haptic_end(session->haptic); /* first: the hand is let go */
   hapi_contact_stop_thread(session->contact);
-  hapi_session_stop_network(session);
+  if (session->ferry.stop != NULL) {
+    session->ferry.stop(session);
+  }
   hapi_physics_end(session->physics);
   if (!ended) {
     hap_detail where;

@@ -105,23 +105,18 @@ static void *network_main(void *arg)
   return NULL;
 }
 
-hap_status hapi_session_start_network(hap_session *session)
+static hap_status network_start(hap_session *session)
 {
   hapi_far *far = session->ferry.far;
-  if (far == NULL) {
-    return HAP_OK;
-  }
   atomic_store(&far->stop, 0);
   return hapi_thread_start(&far->thread, network_main, far, "hapode-network",
                            session->def.rt_priority / 2);
 }
 
-void hapi_session_stop_network(hap_session *session)
+static void network_stop(hap_session *session)
 {
-  if (session->ferry.far != NULL) {
-    atomic_store(&session->ferry.far->stop, 1);
-    hapi_thread_join(&session->ferry.far->thread);
-  }
+  atomic_store(&session->ferry.far->stop, 1);
+  hapi_thread_join(&session->ferry.far->thread);
 }
 
 static void far_renew(void *of)
@@ -158,6 +153,10 @@ hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *
   if (side != HAPI_SIDE_WORLD) {
     ferry.before_tick = far_before_tick;
     ferry.after_tick = far_after_tick;
+  }
+  if (side == HAPI_SIDE_LOOP) {
+    ferry.start = network_start;
+    ferry.stop = network_stop;
   }
   HAPI_TRY(hapi_session_set_ferry(session, &ferry));
   hap_status status = far_fill(session, far);

@@ -51,6 +51,10 @@ typedef struct hapi_ferry {
   void (*after_tick)(void *of, int64_t now_ns);   /* the state away from the loop */
   struct hapi_far *far; /* the ends that are the ferry; NULL: something else is */
   hapi_remote *own;     /* what serve or connect have made; else NULL */
+  /* A thread of its own, in drives with threads; stop is idempotent. NULL: it needs none. */
+  hap_status (*start)(hap_session *session);
+  void (*stop)(hap_session *session);
+  void (*free)(hap_session *session); /* own */
 } hapi_ferry;
 
 /* For tests and the bench: after run_ticks, stop_ticks are left out; 0: none. */
@@ -135,10 +139,6 @@ typedef struct hapi_far {
  * Errors as above, and HAP_ERROR_MEMORY. */
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
 void hapi_far_finish(hapi_far *far); /* begun before */
-/* The thread of a loop's end; stop is idempotent, and does nothing without one. */
-hap_status hapi_session_start_network(hap_session *session);
-void hapi_session_stop_network(hap_session *session);
-void hapi_session_free_far(hap_session *session); /* what serve or connect have made */
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */

@@ -15,14 +15,12 @@ struct hapi_remote {
   hapi_wire_codec codec;
 };
 
-void hapi_session_free_far(hap_session *session)
+static void remote_free(hap_session *session)
 {
   hapi_remote *own = session->ferry.own;
-  if (own != NULL) {
-    hapi_far_finish(&own->far);
-    hapi_wire_codec_finish(&own->codec);
-    hapi_free(own);
-  }
+  hapi_far_finish(&own->far);
+  hapi_wire_codec_finish(&own->codec);
+  hapi_free(own);
 }
 
 static hap_status remote_check(const hap_session *session, const hap_link *link, hapi_side side)
@@ -64,7 +62,8 @@ static hap_status remote_open(hap_session *session, hap_link *link, hapi_side si
   own->far.world.end = own->far.loop.end = end;
   hap_status status = hapi_session_set_far(session, side, &own->far);
   if (status >= HAP_OK || session->ferry.far == &own->far) {
-    session->ferry.own = own; /* freed with the session */
+    session->ferry.own = own;
+    session->ferry.free = remote_free;
   } else {
     hapi_wire_codec_finish(&own->codec);
     hapi_free(own);
