@@ -157,8 +157,8 @@ HAP_NODISCARD HAP_API hap_status hap_link_local_set_paths(hap_link *client,
 /* What a transport is to send. Final. */
 typedef struct hap_link_parcel {
   hap_link_address to; /* checked */
-  uint32_t reliable; /* 0: a newest message */
-  uint32_t bytes;    /* at data */
+  uint32_t reliable;   /* 0: a newest message */
+  uint32_t bytes;      /* at data */
   const void *data;
 } hap_link_parcel;
 
