@@ -18,6 +18,7 @@
 #define FLAG(of, member) MEMBER(of, member, 1, HAPI_WIRE_BOOL, 0)
 #define EXACT(of, member, n) MEMBER(of, member, n, HAPI_WIRE_EXACT, 0)
 #define OPEN(of, member, n) MEMBER(of, member, n, HAPI_WIRE_OPEN, 0)
+#define LIKE(of, member, n) MEMBER(of, member, n, HAPI_WIRE_LIKE, 0)
 #define SINGLE(of, member, n) MEMBER(of, member, n, HAPI_WIRE_SINGLE, 0)
 #define FIXED(of, member, n, bits) MEMBER(of, member, n, HAPI_WIRE_FIXED, bits)
 #define NOT(of, member) MEMBER(of, member, 0, HAPI_WIRE_NOT, 0)

@@ -195,7 +195,7 @@ static const hapi_wire_field state_fields[] = {
     S(LONG, now_ns),
     S(EXACT, time_scale, 1),
     S(EXACT, hand_impulse, 3),
-    S(EXACT, owned_impulse, 3),
+    S(LIKE, owned_impulse, 3),
     S(LONG, load.ticks),
     S(LONG, load.over),
     S(FIXED, load.spent_ns, 1, 0),
@@ -396,8 +396,8 @@ void hapi_wire_find_xor(hapi_wire_kind kind, bool *out)
   for (uint32_t i = 0; i < r->field_count; ++i) {
     const hapi_wire_field *f = &r->fields[i];
     for (uint32_t k = 0; k < f->count; ++k) {
-      out[at++] =
-          f->type == HAPI_WIRE_EXACT || f->type == HAPI_WIRE_OPEN || f->type == HAPI_WIRE_SINGLE;
+      out[at++] = f->type == HAPI_WIRE_EXACT || f->type == HAPI_WIRE_OPEN ||
+                  f->type == HAPI_WIRE_LIKE || f->type == HAPI_WIRE_SINGLE;
     }
   }
 }
@@ -419,26 +419,33 @@ static double steps_of(unsigned bits)
   return (double)(UINT64_C(1) << bits);
 }
 
+/* Doubles of which all bits travel. */
+static bool pack_bits(const hapi_wire_field *f, const double *from, uint64_t *out)
+{
+  for (uint32_t i = 0; i < f->count; ++i) {
+    memcpy(&out[i], &from[i], sizeof out[i]);
+    if (f->type == HAPI_WIRE_OPEN ? from[i] != from[i] : !(from[i] - from[i] == 0.0)) {
+      return false;
+    }
+    if (f->type == HAPI_WIRE_LIKE) {
+      out[i] ^= (out - f->count)[i];
+    }
+  }
+  return true;
+}
+
 static bool pack_doubles(const hapi_wire_field *f, const double *from, uint64_t *out)
 {
   double steps = steps_of(f->bits);
   for (uint32_t i = 0; i < f->count; ++i) {
-    if (f->type != HAPI_WIRE_EXACT && f->type != HAPI_WIRE_OPEN && f->type != HAPI_WIRE_SINGLE) {
-      if (!pack_fixed(from[i], steps, &out[i])) {
-        return false;
-      }
-      continue;
-    }
     float single = (float)from[i];
     uint32_t bits;
-    memcpy(&out[i], &from[i], sizeof out[i]);
     if (f->type == HAPI_WIRE_SINGLE) {
       memcpy(&bits, &single, sizeof bits);
       out[i] = bits;
-      if (!(single - single == 0.0f)) {
-        return false;
-      }
-    } else if (f->type == HAPI_WIRE_EXACT ? !(from[i] - from[i] == 0.0) : from[i] != from[i]) {
+    }
+    if (f->type == HAPI_WIRE_SINGLE ? !(single - single == 0.0f)
+                                    : !pack_fixed(from[i], steps, &out[i])) {
       return false;
     }
   }
@@ -465,6 +472,8 @@ static bool pack_field(const hapi_wire_field *f, const char *from, const hapi_wi
       return true;
     case HAPI_WIRE_EXACT:
     case HAPI_WIRE_OPEN:
+    case HAPI_WIRE_LIKE:
+      return pack_bits(f, (const double *)(const void *)from, out);
     case HAPI_WIRE_SINGLE:
     case HAPI_WIRE_FIXED:
     case HAPI_WIRE_QUAT:
@@ -526,9 +535,7 @@ static void unpack_doubles(const hapi_wire_field *f, const uint64_t *cells, doub
     return;
   }
   for (uint32_t i = 0; i < f->count; ++i) {
-    if (f->type == HAPI_WIRE_EXACT || f->type == HAPI_WIRE_OPEN) {
-      memcpy(&out[i], &cells[i], sizeof out[i]);
-    } else if (f->type == HAPI_WIRE_SINGLE) {
+    if (f->type == HAPI_WIRE_SINGLE) {
       uint32_t bits = (uint32_t)cells[i];
       float single;
       memcpy(&single, &bits, sizeof single);
@@ -543,6 +550,7 @@ static void unpack_field(const hapi_wire_field *f, const uint64_t *cells, hapi_w
                          const void *of, char *out)
 {
   uint32_t number;
+  uint64_t bits;
   hapi_tag tag;
   switch ((hapi_wire_type)f->type) {
     case HAPI_WIRE_U32:
@@ -559,6 +567,14 @@ static void unpack_field(const hapi_wire_field *f, const uint64_t *cells, hapi_w
       return;
     case HAPI_WIRE_EXACT:
     case HAPI_WIRE_OPEN:
+      memcpy(out, cells, f->count * sizeof *cells);
+      return;
+    case HAPI_WIRE_LIKE:
+      for (uint32_t i = 0; i < f->count; ++i) {
+        bits = cells[i] ^ (cells - f->count)[i];
+        memcpy(out + i * sizeof bits, &bits, sizeof bits);
+      }
+      return;
     case HAPI_WIRE_SINGLE:
     case HAPI_WIRE_FIXED:
     case HAPI_WIRE_QUAT:
@@ -615,6 +631,7 @@ static bool check_cell(hapi_wire_type type, uint64_t cell)
     case HAPI_WIRE_OWN:
       return cell <= 1;
     case HAPI_WIRE_EXACT:
+    case HAPI_WIRE_LIKE:
       return (cell >> 52 & 0x7ffu) != 0x7ffu;
     case HAPI_WIRE_OPEN:
       return (cell & UINT64_C(0x7fffffffffffffff)) <= UINT64_C(0x7ff0000000000000);
@@ -640,7 +657,8 @@ const char *hapi_wire_check(hapi_wire_kind kind, const uint64_t *cells)
     const hapi_wire_field *f = &r->fields[i];
     bool good = true;
     for (uint32_t k = 0; k < f->count; ++k) {
-      good = good && check_cell((hapi_wire_type)f->type, cells[k]);
+      uint64_t like = f->type == HAPI_WIRE_LIKE ? (cells - f->count)[k] : 0;
+      good = good && check_cell((hapi_wire_type)f->type, cells[k] ^ like);
     }
     if (f->type == HAPI_WIRE_QUAT || f->type == HAPI_WIRE_FREE) {
       good = good && check_quat(cells, steps_of(f->bits), f->type == HAPI_WIRE_FREE);

@@ -52,6 +52,7 @@ typedef enum hapi_wire_type {
   HAPI_WIRE_BOOL,   /* bool */
   HAPI_WIRE_EXACT,  /* double, all bits */
   HAPI_WIRE_OPEN,   /* the same, and it may be infinite */
+  HAPI_WIRE_LIKE,   /* as EXACT, told by what differs from the field before: often nothing */
   HAPI_WIRE_SINGLE, /* double, rounded to a float */
   HAPI_WIRE_FIXED,  /* double, in whole steps of 2^-bits */
   HAPI_WIRE_QUAT,   /* double[4]: likewise, a unit quaternion */
