@@ -341,6 +341,35 @@ TEST(in_threads_a_world_that_falls_silent_is_felt_as_nothing)
   CHECK(stats.faults.stale_times >= 1 && stats.faults.count == 0);
 }
 
+/* Frames of 16 ms for two seconds: the hand comes down in the middle. */
+TEST(a_world_in_a_frame_loop_is_felt_in_another_session)
+{
+  static cable cables[2];
+  side *world = side_new(HAP_DRIVE_FRAME);
+  side *hand = side_new(HAP_DRIVE_THREADS);
+  side_create(world, true);
+  side_create(hand, false);
+  side_add_hand(hand);
+  side_put(hand, 0.2);
+  cables_open(cables);
+  REQUIRE(hap_link_create(&cable_ops, &cables[0], &world->link, NULL) == HAP_OK);
+  REQUIRE(hap_link_create(&cable_ops, &cables[1], &hand->link, NULL) == HAP_OK);
+  REQUIRE(hap_session_serve(world->session, world->link) == HAP_OK);
+  REQUIRE(hap_session_connect(hand->session, hand->link) == HAP_OK);
+  REQUIRE(hap_session_start(world->session) >= HAP_OK);
+  REQUIRE(hap_session_start(hand->session) >= HAP_OK);
+  bool felt = false;
+  for (int frame = 0; frame < 600 && !felt; ++frame) {
+    CHECK(hap_session_update(world->session, 0.016) >= HAP_OK);
+    if (frame == 60) {
+      side_put(hand, 0.057);
+    }
+    felt = fabs(side_feel(hand) - 3.0) < 0.05;
+    usleep(16000);
+  }
+  CHECK(felt);
+}
+
 /* ---- what does not go ---- */
 
 TEST(what_does_not_go_over_a_network_is_refused_with_a_text)
@@ -378,5 +407,17 @@ TEST(what_does_not_go_over_a_network_is_refused_with_a_text)
   side_create(s, true);
   session_run(s->session);
   CHECK(hap_session_serve(s->session, link) == HAP_ERROR_STATE);
+  s = side_new(HAP_DRIVE_LOCKSTEP);
+  side_create(s, true);
+  hap_pointer_def hand;
+  hap_pointer_def_init(&hand, sizeof hand);
+  CHECK(hap_session_serve(s->session, link) == HAP_OK);
+  CHECK(hap_pointer_add(s->session, &hand, &s->hand) == HAP_ERROR_STATE);
+  CHECK(strstr(side_detail(s), "hap_session_connect") != NULL);
+  session_run(s->session);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  CHECK(hap_session_start(s->session) == HAP_ERROR_STATE);
+  CHECK(strstr(side_detail(s), "anew") != NULL);
+  tap_release(s);
   hap_link_close(link);
 }

@@ -23,7 +23,8 @@ HAP_BEGIN_DECLS
  * start, and without pointers. The link is borrowed: it belongs to the physics thread while the
  * session runs, and is closed after hap_session_destroy. Drives THREADS, FRAME and LOCKSTEP.
  *
- * When the hand's session leaves, its bodies are the world's again. Another one may join then.
+ * When the hand's session leaves, its bodies are the world's again. Another one may join then. A
+ * session that is served or connected is started once.
  *
  * HAP_ERROR_ARGUMENT: a NULL. HAP_ERROR_STATE: started already. HAP_ERROR_UNSUPPORTED: another
  * model than CONTACT, looking back, a contact callback, or a session that is recorded or played;

@@ -238,6 +238,12 @@ hap_status hap_session_start(hap_session *session)
     return hapi_session_fail(session, HAP_ERROR_THREAD,
                              "start in a callback or while this thread holds the lock");
   }
+  if (session->ran && session->ferry.own != NULL) {
+    (void)hapi_physics_unlock(session->physics);
+    return hapi_session_fail(session, HAP_ERROR_STATE,
+                             "a session that is served or connected is started once: the other "
+                             "end would take it for the same; create it anew");
+  }
   if (session->ran && session->player != NULL) {
     (void)hapi_physics_unlock(session->physics);
     return hapi_session_fail(session, HAP_ERROR_STATE,
