@@ -68,10 +68,13 @@ static hap_status cable_poll(void *self, int64_t now_ns, hap_link_event *out, ha
     cable_put(c, CABLE_JOIN, NULL);
     c->told = true;
   }
-  ssize_t size = recv(c->socket, c->in, sizeof c->in, MSG_DONTWAIT);
-  if (size < CABLE_HEAD) {
-    return HAP_END;
-  }
+  ssize_t size = 0;
+  do { /* what is left of another client goes */
+    size = recv(c->socket, c->in, sizeof c->in, MSG_DONTWAIT);
+    if (size < CABLE_HEAD) {
+      return HAP_END;
+    }
+  } while (c->in[0] == CABLE_MESSAGE && !c->joined);
   out->peer = c->server ? 1 : HAP_LINK_SERVER;
   if (c->in[0] == CABLE_JOIN) {
     out->kind = HAP_LINK_JOINED;
