@@ -561,6 +561,9 @@ static inline hapi_state *wire_state_step(wire_world *w)
     dice_fill(&e, body->angular_impulse, 3);
     dice_fill(&e, body->residual, 6);
     dice_fill(&e, body->gain, 6);
+    if ((i + w->number) % 8 == 0) {
+      memcpy(body->gain, s->hand_impulse, sizeof s->hand_impulse);
+    }
     body->owned_until_ns = dice_below(&e, 2) != 0 ? dice_below(&e, 1u << 30) : 0;
     if (body->owned_until_ns != 0) {
       dice_pose(&e, &body->owned_pose);

@@ -323,9 +323,9 @@ const hapi_wire_record hapi_wire_records[HAPI_WIRE_KINDS] = {
     [HAPI_WIRE_TOOL_PAIR] =
         RECORD("tool pair", tool_pair_fields, hapi_near_tool_pair, 0, true, false),
     [HAPI_WIRE_STATE] = RECORD("state", state_fields, hapi_state, 0, false, false),
-    [HAPI_WIRE_POINTER] = RECORD("pointer", pointer_fields, hapi_state_pointer, 1, false, false),
+    [HAPI_WIRE_POINTER] = RECORD("pointer", pointer_fields, hapi_state_pointer, 1, true, false),
     [HAPI_WIRE_HULL] = RECORD("hull", hull_fields, hapi_tool_hull, 1, true, false),
-    [HAPI_WIRE_MOVED] = RECORD("moved", moved_fields, hapi_state_body, 1, false, false),
+    [HAPI_WIRE_MOVED] = RECORD("moved", moved_fields, hapi_state_body, 2, false, false),
     [HAPI_WIRE_TOUCH] = RECORD("touch", touch_fields, hapi_state_contact, 0, false, false),
     [HAPI_WIRE_SPRING] = RECORD("spring", spring_fields, hapi_state_spring, 0, false, false),
     [HAPI_WIRE_GIVEN] = RECORD("given", given_fields, hapi_state_joint, 0, false, false),

@@ -30,13 +30,27 @@ static uint64_t *state_add(packing *p, hapi_wire_kind kind, uint64_t key, const 
   return cells;
 }
 
-static void state_add_at(packing *p, hapi_wire_kind kind, uint64_t key, uint32_t slot,
-                         const void *from)
+/* Place of the gain among the cells of a body. */
+#define MOVED_GAIN 24u
+
+/* What all hands gave is often what one body got, bit for bit: then it is told once. */
+static void pack_gain(const hapi_state *state, const hapi_state_body *body, uint64_t *cells)
+{
+  bool same = memcmp(body->gain, state->hand_impulse, sizeof state->hand_impulse) == 0;
+  cells[1] = same;
+  if (same) {
+    memset(cells + MOVED_GAIN, 0, 3 * sizeof *cells);
+  }
+}
+
+static uint64_t *state_add_at(packing *p, hapi_wire_kind kind, uint64_t key, uint32_t slot,
+                              const void *from)
 {
   uint64_t *cells = state_add(p, kind, key, from);
   if (cells != NULL) {
     cells[0] = slot;
   }
+  return cells;
 }
 
 static uint64_t key_of(uint32_t slot, uint32_t generation)
@@ -51,12 +65,12 @@ static void pack_pointers(packing *p, hapi_state *state)
     if (pointer->generation == 0) {
       continue;
     }
-    state_add_at(p, HAPI_WIRE_POINTER, i, i, pointer);
+    (void)state_add_at(p, HAPI_WIRE_POINTER, key_of(i, pointer->generation), i, pointer);
     if (pointer->is_tool != 0) {
       const hapi_tool_hull *hull = &hapi_state_hulls(state)[i];
       uint64_t key = hapi_hash_word(HAPI_HASH_BEGIN, key_of(i, hull->count));
       key = hapi_hash_doubles(key, hull->points[0], 3 * HAPI_TOOL_POINTS_MAX);
-      state_add_at(p, HAPI_WIRE_HULL, key, i, hull);
+      (void)state_add_at(p, HAPI_WIRE_HULL, key, i, hull);
     }
   }
 }
@@ -69,8 +83,9 @@ hap_status hapi_wire_state_pack(hapi_wire_sender *sender, hapi_state *state, hap
   pack_pointers(&p, state);
   for (uint32_t i = 0; i < state->body_high; ++i) {
     const hapi_state_body *body = &hapi_state_bodies(state)[i];
-    if (body->generation != 0) {
-      state_add_at(&p, HAPI_WIRE_MOVED, i, i, body);
+    uint64_t *cells = body->generation != 0 ? state_add_at(&p, HAPI_WIRE_MOVED, i, i, body) : NULL;
+    if (cells != NULL) {
+      pack_gain(state, body, cells);
     }
   }
   for (uint32_t i = 0; i < state->contact_count; ++i) {
@@ -225,8 +240,12 @@ static const char *bodies_accept(const accepting *a)
       return "a body's slot is out of range, or two have it";
     }
     (void)unpack(a, HAPI_WIRE_MOVED, i, &bodies[slot]);
-    if (bodies[slot].generation == 0) {
-      return "a body's generation is 0";
+    uint64_t same = hapi_wire_cells_at(a->frame, a->in->shape, HAPI_WIRE_MOVED, i)[1];
+    if (same == 1) {
+      memcpy(bodies[slot].gain, a->in->state->hand_impulse, sizeof a->in->state->hand_impulse);
+    }
+    if (bodies[slot].generation == 0 || same > 1) {
+      return "a body's generation is 0, or its gain is of no kind";
     }
   }
   return NULL;
