@@ -62,6 +62,19 @@ hap_status remote_beside(bench *b, const accuracy_scene *which, accuracy_motion 
   return scene_run(b, which, 0.0, &def, out);
 }
 
+bool remote_is_early(const accuracy_motion *reference)
+{
+  const size_t late = (size_t)(REMOTE_LATE_S * ACCURACY_HAPTIC_HZ);
+  bool touches = false;
+  for (size_t i = 0; i < late && i < reference->count; ++i) {
+    for (size_t k = 0; k < SCENE_POINTERS_MAX; ++k) {
+      const double *f = reference->frames[i].force[k];
+      touches = touches || f[0] != 0.0 || f[1] != 0.0 || f[2] != 0.0;
+    }
+  }
+  return touches;
+}
+
 /* ---- apart ---- */
 
 static hap_status links_open(remote_run *run, hap_detail *detail)

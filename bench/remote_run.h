@@ -58,6 +58,9 @@ double remote_look_ahead(const remote_run *run); /* s, of physics */
 /* NULL: there is none of that name. */
 const accuracy_scene *remote_scene(const char *name);
 
+/* Whether something touches a hand before that begins to move: then nobody may have joined yet. */
+bool remote_is_early(const accuracy_motion *reference);
+
 /* ODE alone at 1 kHz, with the same hand. */
 hap_status remote_reference(bench *b, const accuracy_scene *which, double seconds,
                             accuracy_motion *out);
