@@ -9,6 +9,7 @@
 #include "remote/stamps.h"
 #include "remote/terms.h"
 #include "session/session_internal.h"
+#include "tests/logged.h"
 #include "tests/ode_world.h"
 #include "tests/raw_codec.h"
 
@@ -330,6 +331,50 @@ TEST(a_server_that_dies_is_felt_as_nothing_100_ms_after_the_limit)
   client_feel(c, force);
   CHECK_NEAR(force[2], 0.0, 1e-9);
   CHECK(session_stats(c->session).faults.count == 0);
+}
+
+/* ---- a server that is wrong ---- */
+
+static bool future_give(void *self, void *const messages[2])
+{
+  hapi_model *model = messages[0];
+  model->number = ++*(uint64_t *)self;
+  model->state_ns = model->valid_from_ns = model->sent_ns = INT64_C(3600000000000000);
+  model->look_ahead_s = 1e9;
+  return true;
+}
+
+/* Else the guard would wait for it to grow old for ever. */
+TEST(a_model_of_the_future_is_as_old_as_its_arrival)
+{
+  server *s = server_open();
+  client *c = client_open(s, "hand", 1000.0, 8);
+  hapi_loop_end *loop = &c->far.loop;
+  uint64_t number = 0;
+  loop->agreed = true;
+  loop->stamps = (hapi_stamps){.count = 1};
+  loop->end.codec = (hapi_codec){.self = &number, .give = future_give};
+  hapi_loop_end_receive(loop, 5000 * MS);
+  const hapi_model *model = hapi_exchange_model_take(loop->exchange);
+  REQUIRE(model != NULL && model->number == 1);
+  CHECK(model->state_ns == 5000 * MS && model->sent_ns == 5000 * MS);
+  CHECK(model->valid_from_ns == 5000 * MS);
+  CHECK(model->look_ahead_s == loop->terms.look_ahead_s);
+}
+
+TEST(a_world_that_does_not_look_ahead_far_enough_is_warned_of_once)
+{
+  server *s = server_open();
+  client *c = client_open(s, "hand", 1000.0, 8);
+  logged[0] = '\0';
+  log_listen(true);
+  ends_run(s, c, 2000);
+  CHECK(strstr(logged, "away and back") == NULL);
+  c->far.loop.terms.look_ahead_s = 0.05; /* of 0.1 s, and a step of 0.02 s */
+  ends_run(s, c, 200);
+  const char *first = strstr(logged, "away and back");
+  CHECK(first != NULL && strstr(first + 1, "away and back") == NULL);
+  log_listen(false);
 }
 
 /* ---- terms ---- */

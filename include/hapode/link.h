@@ -159,7 +159,7 @@ typedef struct hap_link_parcel {
   hap_link_address to; /* checked */
   uint32_t reliable;   /* 0: a newest message */
   uint32_t bytes;      /* at data */
-  const void *data;
+  const void *data;    /* the message */
 } hap_link_parcel;
 
 /* The operations of a transport, all of them needed. The library has checked addresses, lengths and

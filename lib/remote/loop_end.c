@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "base/alloc.h"
+#include "base/log.h"
 
 hap_status hapi_loop_end_begin(hapi_loop_end *loop)
 {
@@ -22,11 +23,17 @@ void hapi_loop_end_finish(hapi_loop_end *loop)
 
 /* ---- the clocks: messages have the world's; 0 is no time ---- */
 
-static void model_shift(int64_t offset_ns, hapi_model *io)
+static int64_t earlier_of(int64_t a, int64_t b)
 {
-  io->state_ns -= offset_ns;
-  io->valid_from_ns -= offset_ns;
-  io->sent_ns -= io->sent_ns != 0 ? offset_ns : 0;
+  return a < b ? a : b;
+}
+
+/* No model is of the future, whatever it says: the guard would take it for new for as long. */
+static void model_shift(int64_t offset_ns, int64_t now_ns, hapi_model *io)
+{
+  io->state_ns = earlier_of(io->state_ns - offset_ns, now_ns);
+  io->valid_from_ns = earlier_of(io->valid_from_ns - offset_ns, now_ns);
+  io->sent_ns = io->sent_ns != 0 ? earlier_of(io->sent_ns - offset_ns, now_ns) : 0;
 }
 
 static void state_shift(hapi_loop_end *loop, int64_t offset_ns, hapi_state *io)
@@ -74,6 +81,20 @@ static void loop_hear(void *of, const hap_link_event *event)
   }
 }
 
+/* A step more is what the world looks ahead by itself, beside what the loop may be late. */
+static void trip_judge(hapi_loop_end *loop, int64_t trip_ns)
+{
+  double trip_s = 1e-9 * (double)trip_ns;
+  if (!loop->said_far && loop->stamps.count >= HAPI_STAMPS_KEPT &&
+      trip_s > loop->terms.look_ahead_s + loop->terms.period_s) {
+    loop->said_far = true;
+    hapi_log(HAP_LOG_WARNING,
+             "the world is %.0f ms away and back, and looks ahead by %.0f ms: bodies are felt late "
+             "or not at all; give its session more look_ahead",
+             1e3 * trip_s, 1e3 * loop->terms.look_ahead_s);
+  }
+}
+
 void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns)
 {
   hapi_model *model = hapi_exchange_model_back(loop->exchange);
@@ -92,7 +113,8 @@ void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns)
   loop->number = model->number;
   model->look_ahead_s = loop->terms.look_ahead_s; /* whatever a message says */
   int64_t trip_ns;
-  model_shift(hapi_stamps_offset(&loop->stamps, &trip_ns), model);
+  model_shift(hapi_stamps_offset(&loop->stamps, &trip_ns), now_ns, model);
+  trip_judge(loop, trip_ns);
   hapi_exchange_near_publish(loop->exchange);
   hapi_exchange_model_publish(loop->exchange);
 }

@@ -25,6 +25,7 @@ typedef struct hapi_loop_end {
   uint64_t old;            /* models that came behind a newer one */
   int64_t next_ns;         /* when the state is due */
   hapi_stamps stamps;
+  bool said_far;        /* that the world does not look ahead far enough */
   hapi_loop_left *left; /* by slot of a body */
 } hapi_loop_end;
 
