@@ -280,7 +280,7 @@ def differs(said, expected):
 def stream_check(kinds, program, what, steps):
     channel = 2 if what == "world" else 3
     reader = Reader(kinds, channel)
-    text = subprocess.run([program, what, str(steps)], capture_output=True, text=True, check=True)
+    text = subprocess.run([program, what, str(steps), "30"], capture_output=True, text=True, check=True)
     frame, expected, frames, lines, bad = None, [], 0, 0, []
     for line in text.stdout.splitlines():
         words = line.split()

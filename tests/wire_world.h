@@ -426,7 +426,7 @@ static inline void wire_near_make(const wire_world *w, hapi_model *model, hapi_n
     tool->generation = 5;
     tool->radius = 1.0 + dice_unit(&e);
     tool->extent = 1.0 + dice_unit(&e);
-    tool->hull.count = 4 + 60 * i;
+    tool->hull.count = w->bodies > 9 ? 4 + 60 * i : 1;
     dice_fill(&e, tool->hull.points[0], 3 * (int)tool->hull.count);
     dice_pose(&d, &tool->pose);
     dice_twist(&d, &tool->twist);
@@ -489,8 +489,8 @@ static inline void wire_state_pointers(const wire_world *w, wire_dice *d, hapi_s
       wire_dice e = dice_of(11, i, p->generation);
       hapi_tool_hull *hull = &hapi_state_hulls(s)[i];
       memset(hull, 0, sizeof *hull);
-      hull->count = 8;
-      dice_fill(&e, hull->points[0], 24);
+      hull->count = w->bodies > 9 ? 64 : 1;
+      dice_fill(&e, hull->points[0], 3 * (int)hull->count);
     }
   }
 }

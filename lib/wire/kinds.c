@@ -236,7 +236,7 @@ static const hapi_wire_field pointer_fields[] = {
     H(EXACT, damping, 1),
     H(OPEN, friction, 1),
     H(EXACT, finger_radius, 1),
-    H(EXACT, magnet_hold, 1),
+    H(OPEN, magnet_hold, 1),
     H(POSE, pose),
     H(TWIST, twist),
     H(NUMBER, is_tool),

@@ -32,6 +32,7 @@ typedef struct hapi_wire_sender {
   uint64_t number;      /* of the newest frame */
   uint64_t base;        /* newest frame that was acknowledged; 0: none */
   uint64_t kept;        /* newest frame that is kept */
+  uint64_t answer;      /* frames from one that was kept to its acknowledgement, the newest time */
   uint64_t serial;      /* of the newest description that was sent */
   uint8_t *directory;
   size_t directory_size;
