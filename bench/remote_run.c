@@ -81,11 +81,31 @@ static hap_status links_open(remote_run *run, hap_detail *detail)
              : hap_link_local_connect(run->server, "hand", &path, &down, &run->client, detail);
 }
 
+/* Those of the library, unless others are asked for. */
+static hap_status codecs_open(remote_run *run, const hapi_exchange *exchange, hapi_codec out[2])
+{
+  if (run->codecs != NULL) {
+    return run->codecs->open(run->codecs->user, exchange, out);
+  }
+  const hapi_capacity *capacity = hapi_exchange_capacity(exchange);
+  hap_status status = hapi_wire_codec_init(&run->wire[0], capacity, true, &out[0]);
+  return status < HAP_OK ? status : hapi_wire_codec_init(&run->wire[1], capacity, false, &out[1]);
+}
+
+static void codecs_close(remote_run *run)
+{
+  if (run->codecs != NULL) {
+    run->codecs->close(run->codecs->user);
+  }
+  hapi_wire_codec_finish(&run->wire[0]);
+  hapi_wire_codec_finish(&run->wire[1]);
+}
+
 static hap_status apart_join(void *user, hap_session *session)
 {
   remote_run *run = user;
   hapi_codec codecs[2];
-  hap_status status = run->codecs->open(run->codecs->user, session->exchange, codecs);
+  hap_status status = codecs_open(run, session->exchange, codecs);
   if (status < HAP_OK) {
     return hapi_session_fail(session, status, "no codecs");
   }
@@ -132,7 +152,7 @@ hap_status remote_apart(bench *b, remote_run *run, accuracy_motion *out)
     figures_take(run, def.seconds, out);
   }
   hapi_far_finish(&run->far);
-  run->codecs->close(run->codecs->user);
+  codecs_close(run);
   hap_link_close(run->client);
   hap_link_close(run->server);
   run->client = run->server = NULL;

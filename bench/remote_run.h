@@ -7,6 +7,7 @@
  * virtual clock, with nothing but a link between them. */
 
 #include "bench/accuracy.h"
+#include "remote/wire_codec.h"
 #include "session/session_internal.h"
 
 #define REMOTE_PHYSICS_HZ 60.0
@@ -47,6 +48,7 @@ typedef struct remote_run {
 
   /* While it runs. */
   hapi_far far;
+  hapi_wire_codec wire[2];
   hap_link *server;
   hap_link *client;
 } remote_run;

@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include "remote/stamps.h"
 #include "remote/terms.h"
 #include "session/session_internal.h"
 #include "tests/ode_world.h"
@@ -82,6 +83,49 @@ static server *server_open(void)
   return s;
 }
 
+/* ---- a link whose owner has another clock ---- */
+
+typedef struct shifted {
+  hap_link *inner;
+  int64_t ahead_ns; /* the inner link's clock - the owner's */
+} shifted;
+
+static hap_status shifted_send(void *self, int64_t now_ns, const hap_link_parcel *parcel,
+                               hap_detail *detail)
+{
+  shifted *s = self;
+  int64_t then_ns = now_ns + s->ahead_ns;
+  hap_status status =
+      parcel->reliable != 0
+          ? hap_link_send_reliably(s->inner, then_ns, &parcel->to, parcel->data, parcel->bytes)
+          : hap_link_send_newest(s->inner, then_ns, &parcel->to, parcel->data, parcel->bytes);
+  (void)hap_link_detail(s->inner, detail);
+  return status;
+}
+
+static hap_status shifted_poll(void *self, int64_t now_ns, hap_link_event *out, hap_detail *detail)
+{
+  shifted *s = self;
+  hap_status status = hap_link_poll(s->inner, now_ns + s->ahead_ns, out, sizeof *out);
+  out->arrived_ns -= status == HAP_OK ? s->ahead_ns : 0;
+  (void)hap_link_detail(s->inner, detail);
+  return status;
+}
+
+static void shifted_close(void *self)
+{
+  shifted *s = self;
+  hap_link_close(s->inner);
+  s->inner = NULL;
+}
+
+static const hap_link_ops shifted_ops = {.abi = HAP_LINK_ABI,
+                                         .size = sizeof(hap_link_ops),
+                                         .name = "shifted",
+                                         .send = shifted_send,
+                                         .poll = shifted_poll,
+                                         .close = shifted_close};
+
 /* ---- the hand's session ---- */
 
 typedef struct client {
@@ -90,19 +134,21 @@ typedef struct client {
   hap_session *session;
   hap_pointer_id hand;
   hap_link *link;
+  shifted clock;
   hapi_far far;
   raw_codec codec;
-  double at[3];
 } client;
 
 static void client_finish(void *owned)
 {
   client *c = owned;
   ode_world_end(c->session, c->world, c->space);
+  hapi_far_finish(&c->far);
   hap_link_close(c->link);
   raw_finish(&c->codec);
 }
 
+/* Its clock begins at 0, whatever the server's says. */
 static client *client_open(server *s, const char *name, double haptic_hz, int32_t max_bodies)
 {
   client *c = tap_own(sizeof *c, client_finish);
@@ -121,7 +167,9 @@ static client *client_open(server *s, const char *name, double haptic_hz, int32_
   c->session = session_make(&def, &ode);
   hap_link_path_def_init(&path, sizeof path);
   path.delay = 0.5 * ROUND_TRIP;
-  REQUIRE(hap_link_local_connect(s->link, name, &path, &path, &c->link, NULL) == HAP_OK);
+  c->clock.ahead_ns = hap_session_now(s->session);
+  REQUIRE(hap_link_local_connect(s->link, name, &path, &path, &c->clock.inner, NULL) == HAP_OK);
+  REQUIRE(hap_link_create(&shifted_ops, &c->clock, &c->link, NULL) == HAP_OK);
   REQUIRE(raw_init(&c->codec, c->session->exchange, false));
   c->far.loop.end = (hapi_end){.link = c->link, .codec = raw_codec_of(&c->codec)};
   REQUIRE(hapi_session_set_far(c->session, HAPI_SIDE_LOOP, &c->far) == HAP_OK);
@@ -158,20 +206,8 @@ static void ends_run(server *s, client *c, int ticks)
   }
 }
 
-/* Clocks of two sessions are the same where they start together: one that starts later is brought
- * to the other's time before it is heard of. */
-static void client_catch_up(const server *s, client *c)
-{
-  hapi_ferry ferry = c->session->ferry;
-  c->session->ferry = (hapi_ferry){.side = HAPI_SIDE_LOOP};
-  while (hap_session_now(c->session) < hap_session_now(s->session)) {
-    CHECK(hap_session_advance(c->session, 1) == HAP_OK);
-  }
-  c->session->ferry = ferry;
-}
-
 /* Presses 3 mm into the top for a second. N, up. */
-static double press(server *s, client *c)
+static double hand_press(server *s, client *c)
 {
   double force[3];
   client_put(c, 0.0, 0.2, 0.0);
@@ -194,7 +230,7 @@ TEST(a_hand_feels_a_cube_that_only_another_session_has)
 {
   server *s = server_open();
   client *c = client_open(s, "hand", 1000.0, 8);
-  CHECK_NEAR(press(s, c), 3.0, 0.02); /* 3 mm of 1000 N/m */
+  CHECK_NEAR(hand_press(s, c), 3.0, 0.02); /* 3 mm of 1000 N/m */
   hap_stats stats = session_stats(c->session);
   CHECK(stats.faults.stale_ticks == 0 && stats.loop.models_adopted > 50);
   CHECK(stats.loop.model_age_max_s > 0.05 && stats.loop.model_age_max_s < 0.08);
@@ -243,8 +279,9 @@ TEST(another_hand_comes_after_the_first_and_momentum_is_kept)
   double first[2];
   for (int i = 0; i < 2; ++i) {
     client *c = client_open(s, i == 0 ? "first" : "second", 1000.0, 8);
-    client_catch_up(s, c);
-    first[i] = press(s, c);
+    first[i] = hand_press(s, c);
+    hap_stats stats = session_stats(c->session);
+    CHECK(stats.faults.stale_ticks == 0 && stats.loop.model_age_max_s < 0.08);
     tap_release(c);
     ends_run(s, NULL, 300);
     CHECK(dBodyIsEnabled(s->cube) != 0 || dBodyGetPosition(s->cube)[2] > 0.02);
@@ -272,7 +309,7 @@ TEST(of_a_second_hand_nothing_is_taken_and_the_first_one_does_not_feel_it)
     const hap_link_address to = {.channel = channel};
     CHECK(hap_link_send_newest(other, hap_session_now(s->session), &to, "no", 2) == HAP_OK);
   }
-  CHECK_NEAR(press(s, c), 3.0, 0.02);
+  CHECK_NEAR(hand_press(s, c), 3.0, 0.02);
   CHECK(s->far.world.end.refused == HAP_LINK_CHANNELS);
   hap_link_close(other);
 }
@@ -282,7 +319,7 @@ TEST(a_server_that_dies_is_felt_as_nothing_100_ms_after_the_limit)
   server *s = server_open();
   client *c = client_open(s, "hand", 1000.0, 8);
   double force[3];
-  CHECK_NEAR(press(s, c), 3.0, 0.02);
+  CHECK_NEAR(hand_press(s, c), 3.0, 0.02);
   int64_t last_ns = newest_cycle(s);
   int64_t limit_ns = last_ns + 2 * 20 * MS + 150 * MS + MS;
   while (hap_session_now(c->session) <= limit_ns + 100 * MS + MS) {
@@ -351,4 +388,61 @@ TEST(bytes_that_are_no_terms_are_refused)
     hapi_terms_write(&bad, good);
     CHECK(hapi_terms_read(good, sizeof good, &read, &detail) == HAP_ERROR_FORMAT);
   }
+}
+
+/* ---- the clocks ---- */
+
+/* Questions and answers with these ways, where the world's clock is ahead by 5 s. */
+static int64_t offset_of(const int64_t (*ways)[2], uint32_t count, int64_t *out_trip_ns)
+{
+  const int64_t ahead_ns = 5000 * MS;
+  hapi_stamps stamps = {.count = 0};
+  unsigned char question[HAPI_STAMPS_QUESTION];
+  unsigned char answer[HAPI_STAMPS_ANSWER];
+  for (uint32_t i = 0; i < count; ++i) {
+    int64_t now_ns = (i + 1) * 300 * MS;
+    REQUIRE(hapi_stamps_ask(&stamps, now_ns, question));
+    CHECK(!hapi_stamps_ask(&stamps, now_ns + MS, question));
+    const int64_t found_ns = now_ns + ways[i][0] + ahead_ns; /* and 3 ms until the answer goes */
+    const int64_t times_ns[2] = {found_ns, found_ns + 3 * MS};
+    REQUIRE(hapi_stamps_answer(question, sizeof question, times_ns, answer));
+    REQUIRE(hapi_stamps_take(&stamps, answer, sizeof answer,
+                             now_ns + ways[i][0] + ways[i][1] + 3 * MS));
+  }
+  return hapi_stamps_offset(&stamps, out_trip_ns) - ahead_ns;
+}
+
+/* The answer with the shortest round trip counts; what its ways differ by, by half. */
+TEST(the_clocks_are_compared_by_the_fastest_of_sixteen_answers)
+{
+  static const int64_t equal[][2] = {{50 * MS, 50 * MS}};
+  static const int64_t some[][2] = {
+      {60 * MS, 20 * MS}, {30 * MS, 26 * MS}, {90 * MS, 20 * MS}, {20 * MS, 70 * MS}};
+  int64_t many[17][2];
+  int64_t trip_ns;
+  CHECK(offset_of(equal, 1, &trip_ns) == 0 && trip_ns == 100 * MS);
+  CHECK(offset_of(some, 4, &trip_ns) == 2 * MS && trip_ns == 56 * MS);
+  for (int i = 0; i < 17; ++i) {
+    many[i][0] = i == 0 ? 10 * MS : 40 * MS; /* the first one is forgotten by then */
+    many[i][1] = i == 0 ? 10 * MS : (30 + i) * MS;
+  }
+  CHECK(offset_of((const int64_t(*)[2])many, 17, &trip_ns) == (40 - 31) * MS / 2);
+  CHECK(trip_ns == 71 * MS);
+}
+
+TEST(answers_that_cannot_be_true_are_refused)
+{
+  hapi_stamps stamps = {.count = 0};
+  unsigned char question[HAPI_STAMPS_QUESTION];
+  unsigned char answer[HAPI_STAMPS_ANSWER];
+  REQUIRE(hapi_stamps_ask(&stamps, 1000 * MS, question));
+  const int64_t times_ns[2] = {7, 7};
+  CHECK(!hapi_stamps_answer(question, sizeof question - 1, times_ns, answer));
+  REQUIRE(hapi_stamps_answer(question, sizeof question, times_ns, answer));
+  CHECK(!hapi_stamps_take(&stamps, answer, sizeof answer - 1, 1010 * MS));
+  CHECK(!hapi_stamps_take(&stamps, answer, sizeof answer, 990 * MS));   /* before it was asked */
+  CHECK(!hapi_stamps_take(&stamps, answer, sizeof answer, 12000 * MS)); /* of another life */
+  memset(answer, 0xff, sizeof answer);
+  CHECK(!hapi_stamps_take(&stamps, answer, sizeof answer, 1000 * MS));
+  CHECK(stamps.count == 0);
 }

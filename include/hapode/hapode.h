@@ -20,6 +20,7 @@
 #include <hapode/pointer.h>
 #include <hapode/pointer_set.h>
 #include <hapode/record.h>
+#include <hapode/remote.h>
 #include <hapode/research.h>
 #include <hapode/scene.h>
 #include <hapode/session.h>

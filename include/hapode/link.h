@@ -57,6 +57,7 @@ typedef struct hap_link_event {
   /* The message, until the next call with this link. JOINED at a server: the client's name, with
    * its final zero. Else NULL. */
   const void *data;
+  int64_t arrived_ns; /* when it was there to be polled, as far as the transport knows */
 } hap_link_event;
 
 /* Counts of payload since the link was made, without what the transport adds. It has a size and may
@@ -155,9 +156,9 @@ HAP_NODISCARD HAP_API hap_status hap_link_local_set_paths(hap_link *client,
 
 /* What a transport is to send. Final. */
 typedef struct hap_link_parcel {
-  hap_link_address to;
-  uint32_t reliable; /* 0: a newest message */
-  uint32_t bytes;    /* at data */
+  hap_link_address to; /* checked */
+  uint32_t reliable;   /* 0: a newest message */
+  uint32_t bytes;      /* at data */
   const void *data;
 } hap_link_parcel;
 
@@ -172,7 +173,7 @@ typedef struct hap_link_ops {
   /* As hap_link_send_newest and hap_link_send_reliably. Nothing of the parcel is kept. */
   hap_status (*send)(void *self, int64_t now_ns, const hap_link_parcel *parcel, hap_detail *detail);
 
-  /* As hap_link_poll; out arrives zeroed but for its size. */
+  /* As hap_link_poll; out arrives zeroed but for its size. arrived_ns 0 stands for now_ns. */
   hap_status (*poll)(void *self, int64_t now_ns, hap_link_event *out, hap_detail *detail);
 
   /* Peers are told; frees self. */

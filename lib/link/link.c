@@ -166,6 +166,8 @@ hap_status hap_link_poll(hap_link *link, int64_t now_ns, hap_link_event *out, si
     if (status != HAP_OK) {
       return status;
     }
+    bool knows = event.arrived_ns != 0 && event.arrived_ns <= now_ns;
+    event.arrived_ns = knows ? event.arrived_ns : now_ns;
     if (event_is_good(&event)) {
       event_count(link, &event);
       return hapi_struct_give(&event, sizeof event, out, size_of_out);

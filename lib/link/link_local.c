@@ -295,6 +295,7 @@ static hap_status local_poll(void *self, int64_t now_ns, hap_link_event *out, ha
   --end->in.count;
   end->out = message;
   *out = message->event;
+  out->arrived_ns = message->due_ns;
   event_follow(end, now_ns, out);
   return HAP_OK;
 }

@@ -364,6 +364,11 @@ void hapi_physics_set_tape(hapi_physics *physics, hapi_tape *tape)
   physics->tape.tape = tape;
 }
 
+void hapi_physics_set_calls(hapi_physics *physics, const hapi_physics_calls *calls)
+{
+  physics->calls = *calls;
+}
+
 void hapi_physics_set_exchange(hapi_physics *physics, hapi_exchange *exchange)
 {
   physics->config.exchange = exchange;

@@ -33,7 +33,8 @@ void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of)
     if (event.kind == HAP_LINK_MESSAGE && !theirs) {
       snprintf(why.text, sizeof why.text, "it is of peer %u, who has no part here", event.peer);
       hapi_end_refuse(end, &why);
-    } else if (event.kind != HAP_LINK_MESSAGE || event.channel == HAPI_TERMS_CHANNEL) {
+    } else if (event.kind != HAP_LINK_MESSAGE || event.channel == HAPI_TERMS_CHANNEL ||
+               event.channel == HAPI_STAMPS_CHANNEL) {
       hear(of, &event);
     } else if (end->codec.take(end->codec.self, &event, &why) < HAP_OK) {
       hapi_end_refuse(end, &why);
@@ -74,6 +75,13 @@ void hapi_end_send(hapi_end *end, void *const messages[2])
     ++end->failed; /* the codec's own reason: a message that it cannot encode */
     end->detail = why;
   }
+}
+
+void hapi_end_send_stamps(hapi_end *end, const unsigned char *data, uint32_t bytes)
+{
+  const hap_link_parcel parcel = {
+      .to = {.channel = HAPI_STAMPS_CHANNEL}, .bytes = bytes, .data = data};
+  (void)end_post(end, &parcel);
 }
 
 void hapi_end_send_terms(hapi_end *end, const hapi_terms *terms)

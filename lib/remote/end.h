@@ -12,6 +12,7 @@
 #include <hapode/link.h>
 
 #include "remote/codec.h"
+#include "remote/stamps.h"
 #include "remote/terms.h"
 
 typedef struct hapi_end {
@@ -26,7 +27,7 @@ typedef struct hapi_end {
 } hapi_end;
 
 /* What an end makes of an event that is no matter of the codec: the peer has joined or left, or a
- * message of HAPI_TERMS_CHANNEL has come. */
+ * message of HAPI_TERMS_CHANNEL or HAPI_STAMPS_CHANNEL has come. */
 typedef void (*hapi_end_hear)(void *of, const hap_link_event *event);
 
 /* Takes what has come in: the peer's messages to the codec, other events to hear. The rest waits
@@ -35,6 +36,7 @@ void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of);
 /* Encodes and sends, where there is a peer. */
 void hapi_end_send(hapi_end *end, void *const messages[2]);
 void hapi_end_send_terms(hapi_end *end, const hapi_terms *terms);
+void hapi_end_send_stamps(hapi_end *end, const unsigned char *data, uint32_t bytes);
 /* Counts what hear has not understood. */
 void hapi_end_refuse(hapi_end *end, const hap_detail *why);
 

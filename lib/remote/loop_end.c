@@ -3,6 +3,47 @@
 #include "remote/loop_end.h"
 
 #include <math.h>
+#include <stdio.h>
+
+#include "base/alloc.h"
+
+hap_status hapi_loop_end_begin(hapi_loop_end *loop)
+{
+  uint32_t bodies = hapi_exchange_capacity(loop->exchange)->bodies;
+  loop->left = hapi_alloc_array(bodies, sizeof *loop->left);
+  return loop->left != NULL ? HAP_OK : HAP_ERROR_MEMORY;
+}
+
+void hapi_loop_end_finish(hapi_loop_end *loop)
+{
+  hapi_free(loop->left);
+  loop->left = NULL;
+}
+
+/* ---- the clocks: messages have the world's; 0 is no time ---- */
+
+static void model_shift(int64_t offset_ns, hapi_model *io)
+{
+  io->state_ns -= offset_ns;
+  io->valid_from_ns -= offset_ns;
+  io->sent_ns -= io->sent_ns != 0 ? offset_ns : 0;
+}
+
+static void state_shift(hapi_loop_end *loop, int64_t offset_ns, hapi_state *io)
+{
+  io->now_ns += offset_ns;
+  for (uint32_t i = 0; i < io->body_high; ++i) {
+    hapi_state_body *body = &hapi_state_bodies(io)[i];
+    hapi_loop_left *left = &loop->left[i];
+    if (body->owned_until_ns == 0) {
+      continue;
+    }
+    if (left->until_ns != body->owned_until_ns) {
+      *left = (hapi_loop_left){body->owned_until_ns, body->owned_until_ns + offset_ns};
+    }
+    body->owned_until_ns = left->told_ns;
+  }
+}
 
 /* ---- in ---- */
 
@@ -15,6 +56,11 @@ static void loop_hear(void *of, const hap_link_event *event)
     loop->end.peer = event->peer;
   } else if (event->kind == HAP_LINK_LEFT) {
     loop->end.joined = loop->agreed = false;
+  } else if (event->channel == HAPI_STAMPS_CHANNEL) {
+    if (!hapi_stamps_take(&loop->stamps, event->data, event->bytes, event->arrived_ns)) {
+      snprintf(why.text, sizeof why.text, "it is no answer about the time");
+      hapi_end_refuse(&loop->end, &why);
+    }
   } else {
     hapi_terms terms;
     if (hapi_terms_read(event->data, event->bytes, &terms, &why) < HAP_OK ||
@@ -35,7 +81,8 @@ void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns)
   void *const messages[2] = {model, near};
   loop->end.now_ns = now_ns;
   hapi_end_poll(&loop->end, loop_hear, loop);
-  if (!loop->agreed || !loop->end.codec.give(loop->end.codec.self, messages)) {
+  if (!loop->agreed || loop->stamps.count == 0 ||
+      !loop->end.codec.give(loop->end.codec.self, messages)) {
     return;
   }
   if (model->number <= loop->number) {
@@ -44,6 +91,8 @@ void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns)
   }
   loop->number = model->number;
   model->look_ahead_s = loop->terms.look_ahead_s; /* whatever a message says */
+  int64_t trip_ns;
+  model_shift(hapi_stamps_offset(&loop->stamps, &trip_ns), model);
   hapi_exchange_near_publish(loop->exchange);
   hapi_exchange_model_publish(loop->exchange);
 }
@@ -52,7 +101,11 @@ void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns)
 
 void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns)
 {
+  unsigned char question[HAPI_STAMPS_QUESTION];
   loop->end.now_ns = now_ns;
+  if (loop->agreed && hapi_stamps_ask(&loop->stamps, now_ns, question)) {
+    hapi_end_send_stamps(&loop->end, question, sizeof question);
+  }
   if (!loop->agreed || now_ns < loop->next_ns) {
     return;
   }
@@ -60,6 +113,10 @@ void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns)
   void *const messages[2] = {state, NULL};
   if (state == NULL) {
     return;
+  }
+  int64_t trip_ns;
+  if (loop->stamps.count > 0) { /* before, no body is the loop's, and hands can be told already */
+    state_shift(loop, hapi_stamps_offset(&loop->stamps, &trip_ns), state);
   }
   hapi_end_send(&loop->end, messages);
   int64_t period_ns = llround(1e9 * loop->terms.period_s);

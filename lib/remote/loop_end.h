@@ -9,6 +9,13 @@
 #include "remote/end.h"
 #include "sync/exchange.h"
 
+/* When the loop let go of a body, in its own clock and as the world was told. The world tells one
+ * such time from another by its value, so it stays when the clocks are compared anew. */
+typedef struct hapi_loop_left {
+  int64_t until_ns;
+  int64_t told_ns;
+} hapi_loop_left;
+
 typedef struct hapi_loop_end {
   hapi_end end;
   hapi_exchange *exchange; /* of the loop */
@@ -17,7 +24,13 @@ typedef struct hapi_loop_end {
   uint64_t number;         /* of the newest model given */
   uint64_t old;            /* models that came behind a newer one */
   int64_t next_ns;         /* when the state is due */
+  hapi_stamps stamps;
+  hapi_loop_left *left; /* by slot of a body */
 } hapi_loop_end;
+
+/* [control] The exchange is set. HAP_ERROR_MEMORY. */
+hap_status hapi_loop_end_begin(hapi_loop_end *loop);
+void hapi_loop_end_finish(hapi_loop_end *loop); /* zeroed allowed */
 
 /* Between ticks: a newer model and its pairs to the loop and the contact thread. */
 void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns);

@@ -9,6 +9,7 @@
 #include <hapode/expert.h>
 
 #include "base/log.h"
+#include "remote/bytes.h"
 
 static const unsigned char magic[8] = {'h', 'a', 'p', 'o', 'd', 'e', 0x0d, 0x0a};
 
@@ -51,48 +52,16 @@ static uint32_t room_read(const hapi_capacity *capacity, size_t index)
   return room;
 }
 
-/* Little endian, whatever the machine. */
-static void word_write(uint64_t word, int bytes, unsigned char *out)
-{
-  for (int i = 0; i < bytes; ++i) {
-    out[i] = (unsigned char)(word >> (8 * i));
-  }
-}
-
-static uint64_t word_read(const unsigned char *data, int bytes)
-{
-  uint64_t word = 0;
-  for (int i = 0; i < bytes; ++i) {
-    word |= (uint64_t)data[i] << (8 * i);
-  }
-  return word;
-}
-
-static void real_write(double value, unsigned char *out)
-{
-  uint64_t word;
-  memcpy(&word, &value, sizeof word);
-  word_write(word, 8, out);
-}
-
-static double real_read(const unsigned char *data)
-{
-  uint64_t word = word_read(data, 8);
-  double value;
-  memcpy(&value, &word, sizeof value);
-  return value;
-}
-
 void hapi_terms_write(const hapi_terms *terms, unsigned char out[HAPI_TERMS_BYTES])
 {
   memset(out, 0, HAPI_TERMS_BYTES);
   memcpy(out, magic, sizeof magic);
-  word_write(HAPI_TERMS_VERSION, 4, out + 8);
-  real_write(terms->look_ahead_s, out + 16);
-  real_write(terms->period_s, out + 24);
-  real_write(terms->haptic_hz, out + 32);
+  hapi_bytes_write(HAPI_TERMS_VERSION, 4, out + 8);
+  hapi_bytes_write_real(terms->look_ahead_s, out + 16);
+  hapi_bytes_write_real(terms->period_s, out + 24);
+  hapi_bytes_write_real(terms->haptic_hz, out + 32);
   for (size_t i = 0; i < ROOMS; ++i) {
-    word_write(room_read(&terms->capacity, i), 4, out + ROOMS_AT + 4 * i);
+    hapi_bytes_write(room_read(&terms->capacity, i), 4, out + ROOMS_AT + 4 * i);
   }
 }
 
@@ -103,18 +72,18 @@ hap_status hapi_terms_read(const void *data, uint32_t bytes, hapi_terms *out, ha
     return hapi_fail(detail, HAP_ERROR_FORMAT,
                      "the other end does not speak hapode: %u bytes with another begin", bytes);
   }
-  uint32_t version = (uint32_t)word_read(in + 8, 4);
+  uint32_t version = (uint32_t)hapi_bytes_read(in + 8, 4);
   if (version != HAPI_TERMS_VERSION) {
     return hapi_fail(detail, HAP_ERROR_UNSUPPORTED,
                      "the other end speaks version %u, and this one %u: use the same hapode on "
                      "both",
                      version, HAPI_TERMS_VERSION);
   }
-  hapi_terms terms = {.look_ahead_s = real_read(in + 16),
-                      .period_s = real_read(in + 24),
-                      .haptic_hz = real_read(in + 32)};
+  hapi_terms terms = {.look_ahead_s = hapi_bytes_read_real(in + 16),
+                      .period_s = hapi_bytes_read_real(in + 24),
+                      .haptic_hz = hapi_bytes_read_real(in + 32)};
   for (size_t i = 0; i < ROOMS; ++i) {
-    *room_of(&terms.capacity, i) = (uint32_t)word_read(in + ROOMS_AT + 4 * i, 4);
+    *room_of(&terms.capacity, i) = (uint32_t)hapi_bytes_read(in + ROOMS_AT + 4 * i, 4);
   }
   if (!(terms.look_ahead_s >= 0.0 && terms.look_ahead_s <= HAP_LOOK_AHEAD_MOST) ||
       !(terms.period_s > 0.0 && terms.period_s <= PERIOD_MOST_S)) { /* false for NaN */

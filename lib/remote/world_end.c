@@ -92,8 +92,15 @@ static void world_hear(void *of, const hap_link_event *event)
     end->joined = false;
     loop_let_go(world);
   } else if (event->kind == HAP_LINK_MESSAGE) {
-    const hap_detail why = {"a client has no terms to tell"};
-    hapi_end_refuse(end, &why);
+    const hap_detail why = {"it is no question for the time, and a client has no terms to tell"};
+    const int64_t times_ns[2] = {event->arrived_ns, end->now_ns};
+    unsigned char answer[HAPI_STAMPS_ANSWER];
+    if (event->channel == HAPI_STAMPS_CHANNEL &&
+        hapi_stamps_answer(event->data, event->bytes, times_ns, answer)) {
+      hapi_end_send_stamps(end, answer, sizeof answer);
+    } else {
+      hapi_end_refuse(end, &why);
+    }
   }
 }
 

@@ -104,6 +104,9 @@ void hapi_session_free(hap_session *session)
   hapi_physics_destroy(session->physics);
   hapi_contact_destroy(session->contact);
   hapi_exchange_destroy(session->ferry.exchange);
+  if (session->ferry.free != NULL) {
+    session->ferry.free(session);
+  }
   if (!stuck) {
     hapi_exchange_destroy(session->exchange);
     hapi_recorder_destroy(session->recorder);
@@ -140,28 +143,6 @@ static bool may_run(hap_session *session)
          !hapi_physics_lock_is_mine(session->physics);
 }
 
-static hap_status start_threads(hap_session *session)
-{
-  const char *which = "haptic";
-  hap_status status = hapi_haptic_start_thread(session->haptic);
-  if (status >= HAP_OK && session->def.drive == HAP_DRIVE_THREADS) {
-    which = "physics";
-    status = hapi_physics_start_thread(session->physics);
-  }
-  if (status >= HAP_OK) {
-    which = "contact";
-    status = hapi_contact_start_thread(session->contact);
-  }
-  if (status < HAP_OK) {
-    return hapi_session_fail(
-        session, status, "the %s thread could not be started: %s%s", which, strerror(errno),
-        errno == EAGAIN ? " (a limit of threads or memory: ulimit -u, -v)" : "");
-  }
-  bool wanted = session->def.rt_priority > 0;
-  bool given = hapi_haptic_is_realtime(session->haptic) && session->memory_locked;
-  return wanted && !given ? HAP_NO_REALTIME : HAP_OK;
-}
-
 static void ferry_call(const hap_session *session, void (*call)(void *of, int64_t now_ns),
                        int64_t now_ns)
 {
@@ -178,6 +159,39 @@ static bool has_loop(const hap_session *session)
 static bool has_world(const hap_session *session)
 {
   return session->ferry.side != HAPI_SIDE_LOOP;
+}
+
+/* *out_which: the thread that is to be told of where one does not start. */
+static hap_status threads_run(hap_session *session, const char **out_which)
+{
+  *out_which = "haptic";
+  if (has_loop(session)) {
+    HAPI_TRY(hapi_haptic_start_thread(session->haptic));
+  }
+  *out_which = "physics";
+  if (has_world(session) && session->def.drive == HAP_DRIVE_THREADS) {
+    HAPI_TRY(hapi_physics_start_thread(session->physics));
+  }
+  *out_which = "contact";
+  if (has_loop(session)) {
+    HAPI_TRY(hapi_contact_start_thread(session->contact));
+  }
+  *out_which = "network";
+  return session->ferry.start != NULL ? session->ferry.start(session) : HAP_OK;
+}
+
+static hap_status start_threads(hap_session *session)
+{
+  const char *which = NULL;
+  hap_status status = threads_run(session, &which);
+  if (status < HAP_OK) {
+    return hapi_session_fail(
+        session, status, "the %s thread could not be started: %s%s", which, strerror(errno),
+        errno == EAGAIN ? " (a limit of threads or memory: ulimit -u, -v)" : "");
+  }
+  bool wanted = session->def.rt_priority > 0 && has_loop(session);
+  bool given = hapi_haptic_is_realtime(session->haptic) && session->memory_locked;
+  return wanted && !given ? HAP_NO_REALTIME : HAP_OK;
 }
 
 static hap_status session_begin(hap_session *session, hap_detail *detail)
@@ -224,6 +238,12 @@ hap_status hap_session_start(hap_session *session)
     return hapi_session_fail(session, HAP_ERROR_THREAD,
                              "start in a callback or while this thread holds the lock");
   }
+  if (session->ran && session->ferry.own != NULL) {
+    (void)hapi_physics_unlock(session->physics);
+    return hapi_session_fail(session, HAP_ERROR_STATE,
+                             "a session that is served or connected is started once: the other "
+                             "end would take it for the same; create it anew");
+  }
   if (session->ran && session->player != NULL) {
     (void)hapi_physics_unlock(session->physics);
     return hapi_session_fail(session, HAP_ERROR_STATE,
@@ -259,6 +279,9 @@ hap_status hap_session_stop(hap_session *session)
   }
   bool ended = hapi_haptic_end(session->haptic); /* first: the hand is let go */
   hapi_contact_stop_thread(session->contact);
+  if (session->ferry.stop != NULL) {
+    session->ferry.stop(session);
+  }
   hapi_physics_end(session->physics);
   if (!ended) {
     hap_detail where;
@@ -380,9 +403,7 @@ static void step_when_due(hap_session *session)
   int64_t now = time_of(session, session->base) + seconds_in_ns((double)session->step * period);
   /* SINGLE steps up to now, and at the start there is nothing to step. */
   if (session->tick > 0 || !hapi_physics_steps_to_now(session->physics)) {
-    ferry_call(session, session->ferry.before_cycle, now);
     hapi_physics_cycle(session->physics, now, now + seconds_in_ns(next_period));
-    ferry_call(session, session->ferry.after_cycle, now);
   }
   session->base = changes ? session->tick : session->base;
   session->step = changes ? 1 : session->step + 1;

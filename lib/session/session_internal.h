@@ -13,6 +13,7 @@
 #include <hapode/session.h>
 
 #include "base/def.h"
+#include "base/thread.h"
 #include "contact/contact.h"
 #include "haptic/haptic.h"
 #include "physics/physics.h"
@@ -30,8 +31,10 @@ typedef struct hapi_session_gone {
   void *arg;
 } hapi_session_gone;
 
-/* Carries the messages between physics and the loop where each has an exchange of its own. All are
- * called in drive LOCKSTEP, at the time of the tick. */
+typedef struct hapi_remote hapi_remote;
+
+/* Carries the messages between physics and the loop where each has an exchange of its own. Those of
+ * cycles are called by whoever runs the cycle, those of ticks in drive LOCKSTEP alone. */
 typedef enum hapi_side {
   HAPI_SIDE_BOTH,
   HAPI_SIDE_WORLD, /* the session has no loop: physics alone runs */
@@ -46,6 +49,12 @@ typedef struct hapi_ferry {
   void (*after_cycle)(void *of, int64_t now_ns);  /* model and near away from physics */
   void (*before_tick)(void *of, int64_t now_ns);  /* model and near to the loop */
   void (*after_tick)(void *of, int64_t now_ns);   /* the state away from the loop */
+  struct hapi_far *far; /* the ends that are the ferry; NULL: something else is */
+  hapi_remote *own;     /* what serve or connect have made; else NULL */
+  /* A thread of its own, in drives with threads; stop is idempotent. NULL: it needs none. */
+  hap_status (*start)(hap_session *session);
+  void (*stop)(hap_session *session);
+  void (*free)(hap_session *session); /* own */
 } hapi_ferry;
 
 /* For tests and the bench: after run_ticks, stop_ticks are left out; 0: none. */
@@ -119,12 +128,17 @@ hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
 typedef struct hapi_far {
   hapi_world_end world;
   hapi_loop_end loop;
+  bool lockstep;
+  pthread_mutex_t lock; /* between the end's thread and those who ask how it goes */
+  /* Of a loop's end in drive THREADS. */
+  hapi_thread thread;
+  _Atomic int stop;
 } hapi_far;
 
 /* The ends of that side as the session's ferry. *far outlives the session; finish comes after it.
  * Errors as above, and HAP_ERROR_MEMORY. */
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
-void hapi_far_finish(hapi_far *far); /* zeroed allowed */
+void hapi_far_finish(hapi_far *far); /* begun before */
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */

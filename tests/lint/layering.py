@@ -29,7 +29,7 @@ LAYERS = {
     "lib/wire": ["lib/base", "lib/sync", "lib/proximity"],
     "lib/device": ["lib/base"],
     "lib/link": ["lib/base"],
-    "lib/remote": ["lib/base", "lib/sync"],
+    "lib/remote": ["lib/base", "lib/sync", "lib/wire"],
     "lib/solver": ["lib/base"],
     "lib/pointer": ["lib/base", "lib/sync"],
     "lib/local": ["lib/base", "lib/sync", "lib/proximity", "lib/solver", "lib/pointer"],
