@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* wire/wire.h. The input is a row of messages: a byte with the channel, whose high bit says that the
- * message goes to the server, two bytes with its length, and the message. */
+/* wire/wire.h. The input is a row of messages: a byte with the channel, whose high bit says that
+ * the message goes to the server, two bytes with its length, and the message. */
 
 #include "fuzz.h"
 
