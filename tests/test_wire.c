@@ -266,7 +266,7 @@ TEST_EACH(roads, const road *row)
     contacts[sent->number % REMEMBERED] = sent->contact_count;
     traffic_pass(&down, r, &r->down, take_down, false);
     if (step % row->acks_every == 0) {
-      REQUIRE(send_up(r, &state) == HAP_OK);
+      REQUIRE_SAY(send_up(r, &state) == HAP_OK, "%s", r->detail.text);
       traffic_pass(&up, r, &r->up, take_up, false);
     }
     if (world_of(r, &model, &near)) {

@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* lib/wire between physics and loop: a hand feels the same by way of the codec, also where datagrams
- * are lost, doubled and overtaken; and what it costs. The witness beside it is the same session
- * whose messages are copied byte by byte (held_messages.h). */
+/* lib/wire between physics and loop: a hand feels the same by way of the codec, also where
+ * datagrams are lost, doubled and overtaken; and what it costs. The witness beside it is the same
+ * session whose messages are copied byte by byte (held_messages.h). */
 
 #include "tests/tap.h"
 

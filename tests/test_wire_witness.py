@@ -280,7 +280,8 @@ def differs(said, expected):
 def stream_check(kinds, program, what, steps):
     channel = 2 if what == "world" else 3
     reader = Reader(kinds, channel)
-    text = subprocess.run([program, what, str(steps)], capture_output=True, text=True, check=True)
+    text = subprocess.run([program, what, str(steps), "30"], capture_output=True, text=True,
+                          check=True)
     frame, expected, frames, lines, bad = None, [], 0, 0, []
     for line in text.stdout.splitlines():
         words = line.split()
@@ -301,7 +302,8 @@ def stream_check(kinds, program, what, steps):
             lines += len(expected)
             expected = []
     notes = [f"{frames} frames of {what}, {lines} records, {len(reader.bases)} bases"]
-    report(not bad and frames == steps and len(reader.bases) > 3, f"stream_{what}", *notes, *bad[:5])
+    good = not bad and frames == steps and len(reader.bases) > 3
+    report(good, f"stream_{what}", *notes, *bad[:5])
 
 
 # ---- the headers ----

@@ -48,7 +48,7 @@ static inline bool compare_field(const hapi_wire_field *f, const char *a, const 
       case HAPI_WIRE_BOOL:
       case HAPI_WIRE_EXACT:
       case HAPI_WIRE_OPEN:
-    case HAPI_WIRE_LIKE:
+      case HAPI_WIRE_LIKE:
       case HAPI_WIRE_LABEL:
       case HAPI_WIRE_NOT:
         break;

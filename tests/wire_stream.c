@@ -2,9 +2,9 @@
  * SPDX-License-Identifier: MIT */
 
 /* wire_stream members: what lib/wire says of each member of each struct.
- * wire_stream world|state STEPS: messages as they are sent, in hexadecimal ("M channel bytes"), each
- * followed by values of the structs that it was made of ("E ..."). For tests/test_wire_witness.py,
- * which reads the bytes by docs/wire.md alone. */
+ * wire_stream world|state STEPS BODIES: messages as they are sent, in hexadecimal ("M channel
+ * bytes"), each followed by values of the structs that it was made of ("E ..."). For
+ * tests/test_wire_witness.py, which reads the bytes by docs/wire.md alone. */
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -146,7 +146,7 @@ static void state_print(hapi_state *state)
   printf("E end\n");
 }
 
-static int stream_print(bool up, int steps)
+static int stream_print(bool up, int steps, uint32_t bodies)
 {
   stream s = {.up = up};
   hapi_exchange *exchange;
@@ -159,13 +159,13 @@ static int stream_print(bool up, int steps)
     return 1;
   }
   wire_world world = {.exchange = exchange,
-                      .bodies = 30,
-                      .contacts = 12,
-                      .joints = 10,
-                      .geoms = 30,
-                      .pairs = 30,
+                      .bodies = bodies,
+                      .contacts = bodies / 2,
+                      .joints = bodies / 3,
+                      .geoms = bodies,
+                      .pairs = bodies,
                       .rest = 50};
-  wire_world hand = {.exchange = exchange, .bodies = 30};
+  wire_world hand = {.exchange = exchange, .bodies = bodies};
   hap_status status = HAP_OK;
   for (int i = 0; i < steps && status >= HAP_OK; ++i) {
     hapi_model *model;
@@ -198,9 +198,9 @@ int main(int argc, char **argv)
     members_print();
     return 0;
   }
-  if (argc == 3 && (strcmp(argv[1], "world") == 0 || strcmp(argv[1], "state") == 0)) {
-    return stream_print(strcmp(argv[1], "state") == 0, atoi(argv[2]));
+  if (argc == 4 && (strcmp(argv[1], "world") == 0 || strcmp(argv[1], "state") == 0)) {
+    return stream_print(strcmp(argv[1], "state") == 0, atoi(argv[2]), (uint32_t)atoi(argv[3]));
   }
-  fprintf(stderr, "wire_stream members | world STEPS | state STEPS\n");
+  fprintf(stderr, "wire_stream members | world STEPS BODIES | state STEPS BODIES\n");
   return 2;
 }

@@ -7,7 +7,9 @@
 #include "base/alloc.h"
 #include "base/assert.h"
 
-#define HEADER_MOST 88u /* bytes of a datagram before directory and records */
+#define HEADER_MOST 88u  /* bytes of a datagram before directory and records */
+#define APART_MOST 16u   /* frames: six times that is 1.6 s at 60 Hz */
+#define SILENT_LEAST 12u /* frames: of how many an answer may be late or lost */
 #define ROOM (HAPI_WIRE_DATAGRAM - HEADER_MOST)
 
 bool hapi_wire_sender_create(hapi_wire_sender *sender, uint32_t channel, uint32_t first,
@@ -61,20 +63,30 @@ static hapi_wire_frame *sender_frame(hapi_wire_sender *sender, uint64_t number)
   return NULL;
 }
 
-/* One that is not kept; else the oldest that is not the base: it is the most likely to be lost. */
+/* NULL: all are kept. */
 static hapi_wire_frame *sender_free_frame(hapi_wire_sender *sender)
+{
+  for (uint32_t i = 0; i < HAPI_WIRE_KEPT; ++i) {
+    if (sender->frames[i].number == 0) {
+      return &sender->frames[i];
+    }
+  }
+  return NULL;
+}
+
+/* The oldest that is not the base is the most likely to be lost. */
+static void sender_drop_oldest(hapi_wire_sender *sender)
 {
   hapi_wire_frame *oldest = NULL;
   for (uint32_t i = 0; i < HAPI_WIRE_KEPT; ++i) {
     hapi_wire_frame *frame = &sender->frames[i];
-    if (frame->number == 0) {
-      return frame;
-    }
-    if (frame->number != sender->base && (oldest == NULL || frame->number < oldest->number)) {
+    if (frame->number != 0 && frame->number != sender->base &&
+        (oldest == NULL || frame->number < oldest->number)) {
       oldest = frame;
     }
   }
-  return oldest;
+  HAPI_ASSERT(oldest != NULL);
+  oldest->number = 0;
 }
 
 void hapi_wire_sender_begin(hapi_wire_sender *sender)
@@ -117,6 +129,7 @@ bool hapi_wire_sender_acknowledge(hapi_wire_sender *sender, uint64_t number)
   }
   if (number > sender->base && sender_frame(sender, number) != NULL) {
     sender->base = number;
+    sender->answer = sender->number - number;
     for (uint32_t i = 0; i < HAPI_WIRE_KEPT; ++i) {
       if (sender->frames[i].number < number) {
         sender->frames[i].number = 0;
@@ -386,11 +399,25 @@ static hap_status parcel_put_all(parcel *p, const hapi_wire_frame *base)
   return HAP_OK;
 }
 
-/* While no answer comes, ever fewer frames are kept, so that one of them is there when it comes. */
+/* Frames are kept so far apart that one of them is still there when its answer comes, after a round
+ * trip of any length. When no answer comes for long, farther and farther. */
 static bool sender_keeps(const hapi_wire_sender *sender)
 {
-  uint64_t apart = 1 + (sender->number - sender->base) / (HAPI_WIRE_KEPT - 2);
-  return sender->kept <= sender->base || sender->number - sender->kept >= apart;
+  uint64_t silent = sender->number - sender->base;
+  uint64_t apart = silent <= 3 * sender->answer + SILENT_LEAST
+                       ? 1 + sender->answer / (HAPI_WIRE_KEPT - 4)
+                       : 1 + silent / (HAPI_WIRE_KEPT - 2);
+  return sender->kept <= sender->base ||
+         sender->number - sender->kept >= (apart < APART_MOST ? apart : APART_MOST);
+}
+
+static void sender_keep(hapi_wire_sender *sender)
+{
+  sender->now->number = sender->kept = sender->number;
+  sender->now = NULL;
+  if (sender_free_frame(sender) == NULL) {
+    sender_drop_oldest(sender);
+  }
 }
 
 hap_status hapi_wire_sender_send(hapi_wire_sender *sender, uint64_t ack, const hapi_wire_out *out,
@@ -422,8 +449,7 @@ hap_status hapi_wire_sender_send(hapi_wire_sender *sender, uint64_t ack, const h
     return status;
   }
   if (p.keep) {
-    sender->now->number = sender->kept = sender->number;
-    sender->now = NULL;
+    sender_keep(sender);
   }
   return HAP_OK;
 }

@@ -8,7 +8,7 @@
 
 #include "wire/frame.h"
 #include "wire/labels.h"
-#include "wire/wire.h"
+#include "wire/out.h"
 
 #define HAPI_WIRE_VERSION 1u
 #define HAPI_WIRE_DATAGRAM 1200u
@@ -32,6 +32,7 @@ typedef struct hapi_wire_sender {
   uint64_t number;      /* of the newest frame */
   uint64_t base;        /* newest frame that was acknowledged; 0: none */
   uint64_t kept;        /* newest frame that is kept */
+  uint64_t answer;      /* frames from one that was kept to its acknowledgement, the newest time */
   uint64_t serial;      /* of the newest description that was sent */
   uint8_t *directory;
   size_t directory_size;
@@ -46,8 +47,8 @@ void hapi_wire_sender_finish(hapi_wire_sender *sender); /* also of a zeroed one 
 void hapi_wire_sender_begin(hapi_wire_sender *sender);
 /* The cells of a record with this key are to be written. NULL: the list is full. */
 uint64_t *hapi_wire_sender_add(hapi_wire_sender *sender, hapi_wire_kind kind, uint64_t key);
-/* A record of a kind that is alike, of cells; it gets those that were described with the key. False:
- * the list is full. */
+/* A record of a kind that is alike, of cells; it gets those that were described with the key.
+ * False: the list is full. */
 bool hapi_wire_sender_add_alike(hapi_wire_sender *sender, hapi_wire_kind kind, uint64_t key,
                                 const uint64_t *cells);
 

@@ -151,7 +151,7 @@ static uint32_t no_index(const void *of, hapi_wire_kind kind, uint64_t cell)
   return HAPI_WIRE_NOWHERE; /* no record of a state has a label of another */
 }
 
-static uint64_t unpack(const accepting *a, hapi_wire_kind kind, uint32_t place, void *out)
+static uint64_t state_unpack(const accepting *a, hapi_wire_kind kind, uint32_t place, void *out)
 {
   const uint64_t *cells = hapi_wire_cells_at(a->frame, a->in->shape, kind, place);
   hapi_wire_unpack(kind, cells, no_index, NULL, out);
@@ -174,7 +174,7 @@ static const char *head_accept(const accepting *a)
   if (counts[HAPI_WIRE_STATE] != 1) {
     return "it has no head";
   }
-  (void)unpack(a, HAPI_WIRE_STATE, 0, s);
+  (void)state_unpack(a, HAPI_WIRE_STATE, 0, s);
   s->contact_count = counts[HAPI_WIRE_TOUCH];
   s->spring_count = counts[HAPI_WIRE_SPRING];
   s->joint_count = counts[HAPI_WIRE_GIVEN];
@@ -196,7 +196,7 @@ static const char *pointers_accept(const accepting *a)
       return "a pointer's place is out of range, or two have it";
     }
     hapi_state_pointer *p = &pointers[slot];
-    (void)unpack(a, HAPI_WIRE_POINTER, i, p);
+    (void)state_unpack(a, HAPI_WIRE_POINTER, i, p);
     if (p->generation == 0 || p->bound_count > HAP_FORCES_MAX || p->radius < 0.0 ||
         p->stiffness < 0.0 || p->damping < 0.0 || p->friction < 0.0 || p->finger_radius < 0.0 ||
         p->extent < 0.0) {
@@ -215,7 +215,7 @@ static const char *pointers_accept(const accepting *a)
       return "a hull's pointer is none that has one";
     }
     hapi_tool_hull *hull = &hapi_state_hulls(a->in->state)[slot];
-    (void)unpack(a, HAPI_WIRE_HULL, i, hull);
+    (void)state_unpack(a, HAPI_WIRE_HULL, i, hull);
     if (hull->count == 0 || hull->count > HAPI_TOOL_POINTS_MAX) {
       return "a hull has no points, or too many";
     }
@@ -239,7 +239,7 @@ static const char *bodies_accept(const accepting *a)
     if (!slot_of(a, HAPI_WIRE_MOVED, i, high, &slot) || bodies[slot].generation != 0) {
       return "a body's slot is out of range, or two have it";
     }
-    (void)unpack(a, HAPI_WIRE_MOVED, i, &bodies[slot]);
+    (void)state_unpack(a, HAPI_WIRE_MOVED, i, &bodies[slot]);
     uint64_t same = hapi_wire_cells_at(a->frame, a->in->shape, HAPI_WIRE_MOVED, i)[1];
     if (same == 1) {
       memcpy(bodies[slot].gain, a->in->state->hand_impulse, sizeof a->in->state->hand_impulse);
@@ -257,28 +257,28 @@ static const char *rest_accept(const accepting *a)
   const hapi_capacity *c = &a->in->capacity;
   for (uint32_t i = 0; i < s->contact_count; ++i) {
     hapi_state_contact *contact = &hapi_state_contacts(s)[i];
-    (void)unpack(a, HAPI_WIRE_TOUCH, i, contact);
+    (void)state_unpack(a, HAPI_WIRE_TOUCH, i, contact);
     if (contact->slot >= c->contacts) {
       return "a contact's slot is out of range";
     }
   }
   for (uint32_t i = 0; i < s->spring_count; ++i) {
     hapi_state_spring *spring = &hapi_state_springs(s)[i];
-    (void)unpack(a, HAPI_WIRE_SPRING, i, spring);
+    (void)state_unpack(a, HAPI_WIRE_SPRING, i, spring);
     if (spring->slot != HAPI_SLOT_NONE && spring->slot >= c->contacts) {
       return "a spring's contact is out of range";
     }
   }
   for (uint32_t i = 0; i < s->joint_count; ++i) {
     hapi_state_joint *joint = &hapi_state_joints(s)[i];
-    (void)unpack(a, HAPI_WIRE_GIVEN, i, joint);
+    (void)state_unpack(a, HAPI_WIRE_GIVEN, i, joint);
     if (joint->slot >= c->joints || joint->body_a >= c->bodies) {
       return "a joint's slot or body is out of range";
     }
   }
   for (uint32_t i = 0; i < s->side_count; ++i) {
     hapi_tool_side *side = &hapi_state_sides(s)[i];
-    (void)unpack(a, HAPI_WIRE_SIDE, i, side);
+    (void)state_unpack(a, HAPI_WIRE_SIDE, i, side);
     if (side->pointer >= c->pointers || (side->body != HAPI_SLOT_NONE && side->body >= c->bodies)) {
       return "a side's pointer or body is out of range";
     }

@@ -19,22 +19,10 @@
 #include <hapode/status.h>
 
 #include "sync/messages.h"
+#include "wire/out.h"
 
 typedef struct hapi_wire_server hapi_wire_server;
 typedef struct hapi_wire_client hapi_wire_client;
-
-enum {
-  HAPI_WIRE_CHANNEL_KNOWN = 1, /* reliable, in order */
-  HAPI_WIRE_CHANNEL_WORLD = 2, /* datagrams down; part: number of the datagram in its frame */
-  HAPI_WIRE_CHANNEL_STATE = 3  /* datagrams up, likewise */
-};
-
-/* Where the bytes go. A reliable message that is refused goes again with the next send. */
-typedef struct hapi_wire_out {
-  void *of;
-  hap_status (*send)(void *of, uint32_t channel, uint32_t part, bool reliable, const void *data,
-                     uint32_t bytes);
-} hapi_wire_out;
 
 /* Since create, of one end. */
 typedef struct hapi_wire_counts {

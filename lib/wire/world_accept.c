@@ -86,7 +86,7 @@ static const uint64_t *cells_of(const accepting *a, hapi_wire_kind kind, uint32_
   return hapi_wire_cells_at(a->frame, a->world->shape, kind, place);
 }
 
-static void unpack(const accepting *a, hapi_wire_kind kind, uint32_t place, void *out)
+static void world_unpack(const accepting *a, hapi_wire_kind kind, uint32_t place, void *out)
 {
   hapi_wire_unpack(kind, cells_of(a, kind, place), index_of, a, out);
 }
@@ -112,7 +112,7 @@ static bool shape_is_sound(const hapi_shape *shape)
 static const char *body_accept(const accepting *a, uint32_t place)
 {
   hapi_model_body *body = &hapi_model_bodies(a->world->model)[place];
-  unpack(a, HAPI_WIRE_BODY, place, body);
+  world_unpack(a, HAPI_WIRE_BODY, place, body);
   body->course = 0;
   body->tag = body->tag != NULL ? (hapi_tag)(uintptr_t)body->birth : NULL;
   memset(body->response, 0, sizeof body->response);
@@ -148,14 +148,14 @@ static const char *bodies_accept(const accepting *a)
     uint32_t of = index_of(a, HAPI_WIRE_BODY, cells_of(a, HAPI_WIRE_RESPONSE, i)[0]);
     bad = of == NO_INDEX ? "the response of a body that is not there" : NULL;
     if (bad == NULL) {
-      unpack(a, HAPI_WIRE_RESPONSE, i, &hapi_model_bodies(model)[of]);
+      world_unpack(a, HAPI_WIRE_RESPONSE, i, &hapi_model_bodies(model)[of]);
     }
   }
   for (uint32_t i = 0; i < model->course_count && bad == NULL; ++i) {
     uint32_t of = index_of(a, HAPI_WIRE_BODY, cells_of(a, HAPI_WIRE_COURSE, i)[0]);
     bad = of == NO_INDEX ? "the course of a body that is not there" : NULL;
     if (bad == NULL) {
-      unpack(a, HAPI_WIRE_COURSE, i, &hapi_model_courses(model)[i]);
+      world_unpack(a, HAPI_WIRE_COURSE, i, &hapi_model_courses(model)[i]);
       hapi_model_bodies(model)[of].course = i + 1;
     }
   }
@@ -171,7 +171,7 @@ static bool body_is_there(const accepting *a, uint32_t slot)
 static const char *contact_accept(const accepting *a, uint32_t place)
 {
   hapi_model_contact *c = &hapi_model_contacts(a->world->model)[place];
-  unpack(a, HAPI_WIRE_CONTACT, place, c);
+  world_unpack(a, HAPI_WIRE_CONTACT, place, c);
   c->tool = 0;
   c->told.first = c->told.count == 0 ? 0 : c->told.first;
   if (c->slot >= a->world->capacity.contacts || a->world->seen[c->slot] != 0 ||
@@ -193,7 +193,7 @@ static const char *contact_accept(const accepting *a, uint32_t place)
 static const char *joint_accept(const accepting *a, uint32_t place)
 {
   hapi_model_joint *j = &hapi_model_joints(a->world->model)[place];
-  unpack(a, HAPI_WIRE_JOINT, place, j);
+  world_unpack(a, HAPI_WIRE_JOINT, place, j);
   memset(&j->measured, 0, sizeof j->measured);
   if (j->slot >= a->world->capacity.joints || a->world->seen[j->slot] != 0 ||
       (uint32_t)j->kind > HAPI_JOINT_MEASURED) {
@@ -213,7 +213,7 @@ static const char *measured_accept(const accepting *a, uint32_t place)
     return "the measurement of a joint that is not there";
   }
   hapi_measured_joint *m = &hapi_model_joints(a->world->model)[of].measured;
-  unpack(a, HAPI_WIRE_MEASURED, place, m);
+  world_unpack(a, HAPI_WIRE_MEASURED, place, m);
   bool good = m->row_count <= HAPI_MEASURED_ROWS && m->carrier <= HAPI_CARRIER_SECOND;
   for (int i = 0; i < HAPI_JOINT_LIMITS; ++i) {
     good = good && m->axes[i].carrier <= HAPI_CARRIER_WORLD;
@@ -227,8 +227,8 @@ static const char *head_accept(const accepting *a)
   if (a->frame->counts[HAPI_WIRE_MODEL] != 1 || a->frame->counts[HAPI_WIRE_NEAR] != 1) {
     return "it has no head";
   }
-  unpack(a, HAPI_WIRE_MODEL, 0, m);
-  unpack(a, HAPI_WIRE_NEAR, 0, a->world->near);
+  world_unpack(a, HAPI_WIRE_MODEL, 0, m);
+  world_unpack(a, HAPI_WIRE_NEAR, 0, a->world->near);
   bool good = m->model == HAP_MODEL_CONTACT && (uint32_t)m->impulse_pose <= HAP_IMPULSE_HELD &&
               m->number != 0 && m->period_s > 0.0 && m->time_scale >= 0.0 && m->blend_s >= 0.0 &&
               m->watch_count <= HAP_TRACE_BODIES_MAX && a->world->near->contact_hz > 0.0;
@@ -265,7 +265,7 @@ static void triangles_take(const accepting *a)
   for (uint32_t i = 0; i < a->world->model->triangle_count; ++i) {
     hapi_triangle *out = &hapi_model_triangles(a->world->model)[i];
     double corners[9];
-    unpack(a, HAPI_WIRE_TRIANGLE, i, out);
+    world_unpack(a, HAPI_WIRE_TRIANGLE, i, out);
     memcpy(corners, out->corners, sizeof corners);
     hapi_triangle_set(corners, out);
   }
@@ -275,7 +275,7 @@ static const char *feel_accept(const accepting *a, uint32_t place)
 {
   hapi_model_feel *f = &hapi_model_feels(a->world->model)[place];
   memset(f, 0, sizeof *f);
-  unpack(a, HAPI_WIRE_FEEL, place, f);
+  world_unpack(a, HAPI_WIRE_FEEL, place, f);
   return f->pointer >= a->world->capacity.pointers || (f->feel.more & HAPI_FEEL_TEXTURE) != 0
              ? "how a pointer feels a geom is out of range"
              : NULL;
@@ -310,7 +310,7 @@ static const char *model_accept(const accepting *a)
 static const char *placed_accept(const accepting *a, uint32_t place)
 {
   hapi_near_body *body = &hapi_near_bodies(a->world->near)[place];
-  unpack(a, HAPI_WIRE_PLACED, place, body);
+  world_unpack(a, HAPI_WIRE_PLACED, place, body);
   uint64_t same = cells_of(a, HAPI_WIRE_PLACED, place)[0];
   if (body->slot >= a->world->capacity.bodies || same > 1) {
     return "a body's slot is out of range";
@@ -330,7 +330,7 @@ static const char *placed_accept(const accepting *a, uint32_t place)
 static const char *geom_accept(const accepting *a, uint32_t place)
 {
   hapi_near_geom *geom = &hapi_near_geoms(a->world->near)[place];
-  unpack(a, HAPI_WIRE_GEOM, place, geom);
+  world_unpack(a, HAPI_WIRE_GEOM, place, geom);
   geom->shape.hull = NULL;
   uint32_t points = a->world->near->point_count;
   bool hull = geom->shape.kind == HAPI_SHAPE_HULL;
@@ -356,7 +356,7 @@ static const char *pair_accept(const accepting *a, uint32_t place)
 {
   hapi_near *near = a->world->near;
   hapi_near_pair *pair = &hapi_near_pairs(near)[place];
-  unpack(a, HAPI_WIRE_PAIR, place, pair);
+  world_unpack(a, HAPI_WIRE_PAIR, place, pair);
   return pair->geom_a < near->geom_count && pair->geom_b < near->geom_count
              ? NULL
              : "a geom of a pair is not there";
@@ -365,7 +365,7 @@ static const char *pair_accept(const accepting *a, uint32_t place)
 static const char *tool_accept(const accepting *a, uint32_t place)
 {
   hapi_near_tool *tool = &hapi_near_tools(a->world->near)[place];
-  unpack(a, HAPI_WIRE_TOOL, place, tool);
+  world_unpack(a, HAPI_WIRE_TOOL, place, tool);
   return tool->pointer < a->world->capacity.pointers && tool->hull.count > 0 &&
                  tool->hull.count <= HAPI_TOOL_POINTS_MAX && tool->radius >= 0.0 &&
                  tool->extent >= 0.0
@@ -377,7 +377,7 @@ static const char *tool_pair_accept(const accepting *a, uint32_t place)
 {
   hapi_near *near = a->world->near;
   hapi_near_tool_pair *pair = &hapi_near_tool_pairs(near)[place];
-  unpack(a, HAPI_WIRE_TOOL_PAIR, place, pair);
+  world_unpack(a, HAPI_WIRE_TOOL_PAIR, place, pair);
   return pair->tool < near->tool_count && pair->geom < near->geom_count
              ? NULL
              : "a tool or geom of a pair is not there";
@@ -391,7 +391,7 @@ static const char *near_accept(const accepting *a)
     bad = placed_accept(a, i);
   }
   for (uint32_t i = 0; i < near->point_count; ++i) {
-    unpack(a, HAPI_WIRE_VERTEX, i, hapi_near_points(near) + (size_t)3 * i);
+    world_unpack(a, HAPI_WIRE_VERTEX, i, hapi_near_points(near) + (size_t)3 * i);
   }
   for (uint32_t i = 0; i < near->geom_count && bad == NULL; ++i) {
     bad = geom_accept(a, i);
