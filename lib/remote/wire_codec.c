@@ -56,10 +56,10 @@ static bool wire_give(void *self, void *const messages[2])
 
 /* ---- life ---- */
 
-static hap_status wire_open(hapi_wire_codec *codec, bool world)
+static hap_status wire_open(hapi_wire_codec *codec)
 {
-  return world ? hapi_wire_server_create(&codec->capacity, &codec->server)
-               : hapi_wire_client_create(&codec->capacity, &codec->client);
+  return codec->world ? hapi_wire_server_create(&codec->capacity, &codec->server)
+                      : hapi_wire_client_create(&codec->capacity, &codec->client);
 }
 
 static void wire_close(hapi_wire_codec *codec)
@@ -74,9 +74,8 @@ static void wire_close(hapi_wire_codec *codec)
 static void wire_reset(void *self)
 {
   hapi_wire_codec *codec = self;
-  bool world = codec->client == NULL;
   wire_close(codec);
-  if (wire_open(codec, world) < HAP_OK) {
+  if (wire_open(codec) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for a codec: the peer that joins gets nothing");
   }
 }
@@ -84,9 +83,9 @@ static void wire_reset(void *self)
 hap_status hapi_wire_codec_init(hapi_wire_codec *codec, const hapi_capacity *capacity, bool world,
                                 hapi_codec *out)
 {
-  *codec = (hapi_wire_codec){.capacity = *capacity};
+  *codec = (hapi_wire_codec){.capacity = *capacity, .world = world};
   *out = (hapi_codec){codec, wire_send, wire_take, wire_give, wire_reset};
-  return wire_open(codec, world);
+  return wire_open(codec);
 }
 
 void hapi_wire_codec_finish(hapi_wire_codec *codec)

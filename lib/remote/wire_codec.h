@@ -11,6 +11,7 @@
 
 typedef struct hapi_wire_codec {
   hapi_capacity capacity;
+  bool world;               /* of the world's end */
   hapi_wire_server *server; /* of the world's end; else NULL */
   hapi_wire_client *client; /* of the loop's end; else NULL */
 } hapi_wire_codec;
