@@ -158,7 +158,7 @@ static bool far_ends_run(stage *world, stage *hand, hap_link *server, hap_link *
               hap_pointer_add(hand->session, &def, &id) == HAP_OK &&
               hap_session_start(world->session) == HAP_OK &&
               hap_session_start(hand->session) == HAP_OK;
-  for (int i = 0; good && i < 8; ++i) {
+  for (int i = 0; good && i < 30; ++i) {
     good = hap_session_advance(hand->session, 1) == HAP_OK &&
            hap_session_advance(world->session, 1) == HAP_OK;
   }
@@ -174,6 +174,8 @@ static bool work_far(void)
   hap_detail detail = {""};
   stage *world = stage_new(HAP_DRIVE_LOCKSTEP);
   stage *hand = stage_new(HAP_DRIVE_LOCKSTEP);
+  world->def.max_bodies = hand->def.max_bodies = 4; /* little memory is quickly cleared */
+  world->def.max_contacts = hand->def.max_contacts = 48;
   bool good = stage_try(world) && stage_try(hand);
   hap_status status = good ? hap_link_local_serve(&server, &detail) : HAP_ERROR_MEMORY;
   status = status == HAP_OK ? hap_link_local_connect(server, "hand", NULL, NULL, &client, &detail)

@@ -58,6 +58,15 @@ static void run_or_bail(const bench *b, hap_status status)
   REQUIRE_SAY(status >= HAP_OK, "%s", b->detail.text);
 }
 
+/* Over the error beside the world. Until a hand has joined, ODE alone has the world: piles settle a
+ * little otherwise in the few steps. */
+static double margin_of(const accuracy_scene *which)
+{
+  return strcmp(which->name, "tower") == 0  ? 0.012
+         : strcmp(which->name, "hold") == 0 ? 0.003
+                                            : 0.002;
+}
+
 /* As small as beside the world, whatever the way. */
 static void way_check(bench *b, const accuracy_motion *reference, double beside, remote_run *run)
 {
@@ -73,7 +82,7 @@ static void way_check(bench *b, const accuracy_motion *reference, double beside,
       100.0 * errors.force, momentum, 1e3 * run->age_s, 1e-3 * run->bytes_down,
       1e-3 * run->bytes_up, (unsigned long long)run->old,
       (unsigned long long)motion.stats.ahead.dropped);
-  CHECK(errors.force <= beside + 0.002);
+  CHECK(errors.force <= beside + margin_of(run->scene));
   CHECK(errors.torque <= 0.05);
   CHECK(fabs(momentum) < 1e-9 || isnan(momentum)); /* of a hand that moves nothing */
   CHECK(run->refused == 0 && run->failed == 0);
