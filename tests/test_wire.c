@@ -12,7 +12,7 @@
 #include "wire/receiver.h"
 #include "wire/wire.h"
 
-#define POST_MOST 4096u
+#define POST_MOST 400u
 
 typedef struct parcel {
   uint32_t channel;

@@ -260,7 +260,7 @@ static void wire_head(const wire_world *w, hapi_model *model)
   model->bounces = dice_below(&d, 99);
   model->watch_count = 1 + dice_below(&d, HAP_TRACE_BODIES_MAX);
   for (uint32_t i = 0; i < HAP_TRACE_BODIES_MAX; ++i) {
-    model->watch_slot[i] = i % 2 == 0 ? HAPI_SLOT_NONE : dice_below(&d, 60);
+    model->watch_slot[i] = i % 2 == 0 ? HAPI_SLOT_NONE : dice_below(&d, 12);
     dice_fill(&d, model->watch_position[i], 3);
   }
   model->tool_count = model->cross_count = 0;

@@ -85,8 +85,9 @@ static void sender_drop_oldest(hapi_wire_sender *sender)
       oldest = frame;
     }
   }
-  HAPI_ASSERT(oldest != NULL);
-  oldest->number = 0;
+  if (oldest != NULL) {
+    oldest->number = 0;
+  }
 }
 
 void hapi_wire_sender_begin(hapi_wire_sender *sender)

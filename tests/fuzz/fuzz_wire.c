@@ -6,27 +6,40 @@
 
 #include "fuzz.h"
 
-#include "tests/wire_world.h"
+#include "sync/exchange.h"
 #include "wire/wire.h"
+
+/* Small, so that an input takes little time. The corpus is of such a world. */
+static const hapi_capacity fuzz_capacity = {.bodies = 12,
+                                            .contacts = 20,
+                                            .pairs = 12,
+                                            .pointers = 4,
+                                            .geoms = 12,
+                                            .hull_points = 24,
+                                            .joints = 20,
+                                            .tool_points = 10,
+                                            .springs = 10,
+                                            .triangles = 9,
+                                            .feels = 5};
 
 static void model_check(hapi_model *model, hapi_near *near)
 {
-  FUZZ_CHECK(model->body_count <= wire_capacity.bodies &&
-             model->joint_count <= wire_capacity.joints);
-  FUZZ_CHECK(model->contact_count <= wire_capacity.contacts &&
-             near->geom_count <= wire_capacity.geoms);
-  FUZZ_CHECK(near->pair_count <= wire_capacity.pairs &&
-             near->point_count <= wire_capacity.hull_points);
+  FUZZ_CHECK(model->body_count <= fuzz_capacity.bodies &&
+             model->joint_count <= fuzz_capacity.joints);
+  FUZZ_CHECK(model->contact_count <= fuzz_capacity.contacts &&
+             near->geom_count <= fuzz_capacity.geoms);
+  FUZZ_CHECK(near->pair_count <= fuzz_capacity.pairs &&
+             near->point_count <= fuzz_capacity.hull_points);
   for (uint32_t i = 0; i < model->body_count; ++i) {
     const hapi_model_body *body = &hapi_model_bodies(model)[i];
-    FUZZ_CHECK(body->slot < wire_capacity.bodies && body->course <= model->course_count);
+    FUZZ_CHECK(body->slot < fuzz_capacity.bodies && body->course <= model->course_count);
     FUZZ_CHECK(hapi_assert_is_unit(body->pose.quat_wxyz, 4));
     FUZZ_CHECK(hapi_assert_is_finite(body->pose.position, 3) && body->mass - body->mass == 0.0);
     FUZZ_CHECK((body->flags & HAPI_BODY_DRIVEN) != 0 || body->mass > 0.0);
   }
   for (uint32_t i = 0; i < model->contact_count; ++i) {
     const hapi_model_contact *c = &hapi_model_contacts(model)[i];
-    FUZZ_CHECK(c->slot < wire_capacity.contacts && c->pointer < wire_capacity.pointers);
+    FUZZ_CHECK(c->slot < fuzz_capacity.contacts && c->pointer < fuzz_capacity.pointers);
     FUZZ_CHECK(c->told.first <= model->triangle_count);
     FUZZ_CHECK(c->told.count <= model->triangle_count - c->told.first);
   }
@@ -44,10 +57,10 @@ static void model_check(hapi_model *model, hapi_near *near)
 
 static void state_check(hapi_state *state)
 {
-  FUZZ_CHECK(state->body_high <= wire_capacity.bodies &&
-             state->contact_count <= wire_capacity.contacts);
+  FUZZ_CHECK(state->body_high <= fuzz_capacity.bodies &&
+             state->contact_count <= fuzz_capacity.contacts);
   for (uint32_t i = 0; i < state->contact_count; ++i) {
-    FUZZ_CHECK(hapi_state_contacts(state)[i].slot < wire_capacity.contacts);
+    FUZZ_CHECK(hapi_state_contacts(state)[i].slot < fuzz_capacity.contacts);
   }
   for (uint32_t i = 0; i < state->pointer_count; ++i) {
     const hapi_state_pointer *pointer = &hapi_state_pointers(state)[i];
@@ -114,9 +127,9 @@ static void answers_send(const ends *e)
 void fuzz_one(const uint8_t *data, size_t size)
 {
   ends e = {NULL, NULL, NULL};
-  bool made = hapi_exchange_create(&wire_capacity, &e.exchange) == HAP_OK;
-  made = made && hapi_wire_server_create(&wire_capacity, &e.server) == HAP_OK;
-  made = made && hapi_wire_client_create(&wire_capacity, &e.client) == HAP_OK;
+  bool made = hapi_exchange_create(&fuzz_capacity, &e.exchange) == HAP_OK;
+  made = made && hapi_wire_server_create(&fuzz_capacity, &e.server) == HAP_OK;
+  made = made && hapi_wire_client_create(&fuzz_capacity, &e.client) == HAP_OK;
   FUZZ_CHECK(made || fuzz_starved());
   if (made) {
     answers_send(&e);
