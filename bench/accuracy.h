@@ -80,6 +80,9 @@ typedef struct accuracy_run_def {
   double coupling_damping;   /* N s/m */
   hap_integration integration;
   int32_t iterations; /* of QuickStep; 0: the scene's */
+  /* Before the session starts; NULL: nothing is to be done then. */
+  hap_status (*join)(void *user, hap_session *session);
+  void *join_user;
 } accuracy_run_def;
 
 void accuracy_run_def_init(accuracy_run_def *def); /* the library's defaults */

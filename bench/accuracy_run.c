@@ -406,6 +406,9 @@ static hap_status open_rig(bench *b, const accuracy_run_def *def, rig *r, joint_
   if (status >= HAP_OK) {
     status = open_gauge(r->scene, gauge, &b->detail);
   }
+  if (status >= HAP_OK && def->join != NULL) {
+    status = bench_explain(b, r->session, def->join(def->join_user, r->session));
+  }
   return status >= HAP_OK ? bench_explain(b, r->session, hap_session_start(r->session)) : status;
 }
 

@@ -57,6 +57,7 @@ hap_status bench_line(bench *b);
 hap_status bench_oscillation(bench *b);
 hap_status bench_peers(bench *b);
 hap_status bench_poses(bench *b);
+hap_status bench_remote(bench *b);
 hap_status bench_scaling(bench *b);
 hap_status bench_spidar(bench *b);
 hap_status bench_stability(bench *b);

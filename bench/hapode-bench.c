@@ -65,6 +65,8 @@ static const program programs[] = {
      "WORLD[:N][@HZ]"},
     {"poses", bench_poses,
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
+    {"remote", bench_remote,
+     "a hand far from its world: force, bytes and age of models by delay and loss; --scene NAME"},
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},
     {"spidar", bench_spidar,
      "string devices: poses from rounded counts, tensions, times; numerics alone, no device"},
@@ -196,7 +198,7 @@ static bool options_fit(const program *p, const bench *b)
                strcmp(b->estimates, "default") == 0;
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
       p->run != bench_effects && p->run != bench_faults && p->run != bench_late &&
-      p->run != bench_peers) {
+      p->run != bench_peers && p->run != bench_remote) {
     wrong = "has no scenes to choose from";
   } else if (b->random_worlds > 0 && (p->run != bench_faults || b->scene != NULL)) {
     wrong = "has no random worlds: --random is for faults, without --scene";

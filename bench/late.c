@@ -113,8 +113,8 @@ static hap_status late_tick(bench *b, const rig *r, const late_def *def, int tic
       def->pulse_count > 0 && tick >= def->begin && tick < def->end && !late_runs(def, tick);
   hap_pointer_state state;
   memset(&state, 0, sizeof state);
-  r->session->run_ticks = 0;
-  r->session->stop_ticks = stops ? 1 : 0;
+  r->session->pulses.run_ticks = 0;
+  r->session->pulses.stop_ticks = stops ? 1 : 0;
   hap_status status = hap_session_advance(r->session, 1);
   if (status < HAP_OK) {
     return bench_explain(b, r->session, status);

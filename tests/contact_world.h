@@ -195,13 +195,11 @@ static inline hap_stats cw_stats(const contact_world *w)
   return session_stats(w->session);
 }
 
-/* Session and hand, started. The first 16 bodies are traced. */
-static inline void cw_start(contact_world *w, double x, double y, double z)
+/* Session and hand. The first 16 bodies are traced. */
+static inline void cw_make(contact_world *w, double x, double y, double z)
 {
   size_t traced = w->body_count < CW_TRACED_MAX ? (size_t)w->body_count : CW_TRACED_MAX;
-  w->ode.world = w->world;
-  w->ode.space = w->space;
-  w->ode.user = w;
+  w->ode.world = w->world, w->ode.space = w->space, w->ode.user = w;
   w->seen.range_min = UINT32_MAX;
   w->session = session_make(&w->def, &w->ode);
   memcpy(w->hand_at, AT(x, y, z), sizeof w->hand_at);
@@ -214,6 +212,11 @@ static inline void cw_start(contact_world *w, double x, double y, double z)
   (void)hap_session_detail(w->session, &detail);
   REQUIRE_SAY(added, "%s", detail.text);
   cw_put_hand(w, 0.0, 0.0, 0.0);
+}
+
+static inline void cw_start(contact_world *w, double x, double y, double z)
+{
+  cw_make(w, x, y, z);
   session_run(w->session);
 }
 

@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include <hapode/remote.h>
 #include <unistd.h>
 
 #include "tests/failing_heap.h"
@@ -143,6 +144,55 @@ TEST(without_memory_for_probes_the_force_is_still_felt)
   fail_from_now(0, 0);
   stage_end(s);
   CHECK(atomic_load(&heap.lives) == 0);
+}
+
+/* ---- a world and a hand with a link between them ---- */
+
+static bool far_ends_run(stage *world, stage *hand, hap_link *server, hap_link *client)
+{
+  hap_pointer_id id;
+  hap_pointer_def def;
+  hap_pointer_def_init(&def, sizeof def);
+  bool good = hap_session_serve(world->session, server) == HAP_OK &&
+              hap_session_connect(hand->session, client) == HAP_OK &&
+              hap_pointer_add(hand->session, &def, &id) == HAP_OK &&
+              hap_session_start(world->session) == HAP_OK &&
+              hap_session_start(hand->session) == HAP_OK;
+  for (int i = 0; good && i < 30; ++i) {
+    good = hap_session_advance(hand->session, 1) == HAP_OK &&
+           hap_session_advance(world->session, 1) == HAP_OK;
+  }
+  hap_remote_state state;
+  return good && hap_session_remote_state(hand->session, &state, sizeof state, NULL) == HAP_OK &&
+         state.joined == 1;
+}
+
+static bool work_far(void)
+{
+  hap_link *server = NULL;
+  hap_link *client = NULL;
+  hap_detail detail = {""};
+  stage *world = stage_new(HAP_DRIVE_LOCKSTEP);
+  stage *hand = stage_new(HAP_DRIVE_LOCKSTEP);
+  world->def.max_bodies = hand->def.max_bodies = 4; /* little memory is quickly cleared */
+  world->def.max_contacts = hand->def.max_contacts = 48;
+  bool good = stage_try(world) && stage_try(hand);
+  hap_status status = good ? hap_link_local_serve(&server, &detail) : HAP_ERROR_MEMORY;
+  status = status == HAP_OK ? hap_link_local_connect(server, "hand", NULL, NULL, &client, &detail)
+                            : status;
+  CHECK(status == HAP_OK || status == HAP_ERROR_MEMORY);
+  good = status == HAP_OK && far_ends_run(world, hand, server, client);
+  stage_end(hand);
+  stage_end(world);
+  hap_link_close(client);
+  hap_link_close(server);
+  return good;
+}
+
+/* Messages that find no memory are lost, as on a network. */
+TEST(far_ends_with_failing_allocations)
+{
+  fail_each(work_far, true);
 }
 
 /* ---- devices ---- */

@@ -56,6 +56,8 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "memory_and_log": "docs/faults.md",
     "plot_a_trace": "docs/programs.md",
     "servo_loop": "docs/from-chai3d.md",
+    "lossy_link": "docs/remote.md",
+    "far_hand": "docs/remote.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -111,6 +113,21 @@ def check_edit_while_running(program):
     out = run(program)
     said = re.match(r"3 cubes made anew, 0 lost; at most ([0-9.]+) N", out)
     point(said is not None and float(said.group(1)) > 0.2, "the hand feels what is edited", out)
+
+
+def check_lossy_link(program):
+    out = run(program)
+    said = re.search(r"1010 sent; came: (\d+) newest, 10 reliable; 1 left", out)
+    point(said is not None and 960 < int(said.group(1)) < 990, "one in twenty is lost", out)
+
+
+def check_far_hand(program):
+    out = run(program)
+    rows = rows_of(out, r"^box at (-?[0-9.]+) m, hand feels (-?[0-9.]+) N$")
+    point(len(rows) == 4 and rows[0] == ("0.0250", "0.00"), "nothing is touched at first", out)
+    point(len(rows) == 4 and float(rows[3][0]) > 0.12, "the hand pushes the box", out)
+    point(len(rows) == 4 and all(float(f) < -0.5 for _, f in rows[2:]), "the hand feels it", out)
+    point("round trip 100 ms" in out, "the round trip is that of the network", out)
 
 
 def check_make_touchable(program):

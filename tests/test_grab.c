@@ -891,8 +891,8 @@ TEST_EACH(gaps, const gap_row *row)
     hap_pose pose = {{speed * T * (t + 1), 0.0, 0.5}, {cos(turn), sin(turn), 0.0, 0.0}};
     hap_twist twist = {{speed, 0.0, 0.0}, {spin, 0.0, 0.0}};
     REQUIRE(hap_pointer_set_target(d->session, d->hand, &pose, &twist) == HAP_OK);
-    d->session->run_ticks = 0;
-    d->session->stop_ticks = runs ? 0 : 1;
+    d->session->pulses.run_ticks = 0;
+    d->session->pulses.stop_ticks = runs ? 0 : 1;
     REQUIRE(hap_session_advance(d->session, 1) >= HAP_OK);
     if (runs) {
       double elapsed = t - before;

@@ -589,6 +589,30 @@ TEST(a_model_of_two_steps_is_not_too_old)
   CHECK(f.tick.guard.stale);
 }
 
+/* Of 20 ms: two steps, the round trip that both ends have agreed on, and a tick. */
+TEST(a_model_that_the_network_holds_back_is_not_too_old_and_an_outage_takes_100_ms)
+{
+  hapi_pointer *p = guarded_wall();
+  begin_model();
+  f.model->period_s = 0.02;
+  f.model->look_ahead_s = 0.23;
+  (void)add_contact(0, HAPI_SLOT_NONE, 0);
+  model_adopt();
+  hapi_v3_set(p->device.pose.position, -0.005, 0.0, 0.0);
+  int64_t state_ns = f.tick.facts.state_ns;
+  while (f.now_ns <= state_ns + 271 * TICK_NS) {
+    ticks_run(1);
+    CHECK(!f.tick.guard.stale);
+  }
+  CHECK_NEAR(p->device.wrench.force[0], -5.0, 1e-9);
+  ticks_run(1);
+  CHECK(f.tick.guard.stale && p->device.wrench.force[0] > -5.0);
+  ticks_run(98);
+  CHECK(p->device.wrench.force[0] < -1e-3);
+  ticks_run(1);
+  CHECK_NEAR(p->device.wrench.force[0], 0.0, 1e-9);
+}
+
 TEST(without_a_model_and_in_model_single_nothing_grows_old)
 {
   hapi_pointer *p = guarded_alone();

@@ -83,6 +83,8 @@ TEST(single_settings_stay_when_they_are_given)
   CHECK(expert->iterations == 0 && expert->range_hops == HAP_RANGE_ALL);
   CHECK(options_refused("--iterations 0", "--iterations", "1 to 10000"));
   CHECK(options_refused("--iterations worlds", "--iterations", "1 to 10000"));
+  CHECK(options_parse("--look-ahead 0.25") == HAP_OK && expert->look_ahead == 0.25);
+  CHECK(options_refused("--look-ahead 1.5", "--look-ahead", "0 to 1"));
   CHECK(options_parse("--substeps 4") == HAP_OK && expert->substeps == 4);
   CHECK(options_refused("--substeps 65", "--substeps", "1 to 64"));
   CHECK(options_refused("--sweeps 1", "--sweeps", "2 to 10000"));

@@ -106,8 +106,8 @@ static int lines_of_gaps(uint32_t stop_ticks)
   w->research.guard = HAP_GUARD_ON;
   cw_add_floor(w);
   cw_start(w, 0.0, 0.0, 0.5);
-  w->session->run_ticks = 10;
-  w->session->stop_ticks = stop_ticks;
+  w->session->pulses.run_ticks = 10;
+  w->session->pulses.stop_ticks = stop_ticks;
   CHECK(hap_session_advance(w->session, 1000) >= HAP_OK);
   CHECK(hap_hooks_set(NULL) == HAP_OK);
   return atomic_load(&derated_lines);

@@ -321,6 +321,10 @@ static const option table[] = {
      "parts of a step of the world, 1 to 64, each with its own collision phase (default 1); model\n"
      "contact",
      take_count, offsetof(run_options, rig.expert.substeps), 1, 64},
+    {"--look-ahead", "S",
+     "bodies are looked for so many seconds beyond two steps of the world, and a model of it may\n"
+     "be so much older, 0 to 1 (default 0)",
+     take_number, offsetof(run_options, rig.expert.look_ahead), 0, 1},
     {"--sweeps", "N",
      "model contact: over all rows, in each solve of a tick, 2 to 10000; 2: no direct\n"
      "solve (default: until it is solved, or the tick has no more time)",

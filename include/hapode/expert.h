@@ -23,6 +23,8 @@ HAP_BEGIN_DECLS
 /* For hap_expert_def.range_hops: as far as max_bodies allows. */
 #define HAP_RANGE_ALL (-1)
 
+#define HAP_LOOK_AHEAD_MOST 1.0 /* s */
+
 /* Settings of a session. It has a size and may grow at its end. The values in brackets are those of
  * HAP_BY_ACCURACY at HAP_ACCURACY_DEFAULT. */
 typedef struct hap_expert_def {
@@ -81,6 +83,14 @@ typedef struct hap_expert_def {
    * meaning for the whole step. before_step and after_step come once a step, the surface callback
    * and ODE's moved callbacks in each part. A joint's feedback is that of the last part. */
   int32_t substeps;
+
+  /* s, 0..HAP_LOOK_AHEAD_MOST, default 0: how much longer than two steps of the world a message
+   * may be on its way from physics to the loop and back. All that is looked for near the hands and
+   * their bodies is looked for so much farther ahead, and the force fades so much later where the
+   * world does not answer. The reach grows by 15 m/s^2 times the square of it, so bodies and
+   * contacts need more room: hap_stats.ahead says what found none. For a world over a network: the
+   * round trip and its jitter (docs/remote.md) */
+  double look_ahead;
 } hap_expert_def;
 
 /* [any] Fills *def with defaults. size_of_def: sizeof *def of the caller's build. */

@@ -15,10 +15,12 @@
 #include <hapode/grab.h>
 #include <hapode/hooks.h>
 #include <hapode/identify.h>
+#include <hapode/link.h>
 #include <hapode/outputs.h>
 #include <hapode/pointer.h>
 #include <hapode/pointer_set.h>
 #include <hapode/record.h>
+#include <hapode/remote.h>
 #include <hapode/research.h>
 #include <hapode/scene.h>
 #include <hapode/session.h>

@@ -206,6 +206,14 @@ typedef struct hap_event_stats {
   uint64_t dropped; /* events that found no room, and touches beyond HAP_TOUCHES_MAX in each tick */
 } hap_event_stats;
 
+/* What hap_expert_def.look_ahead comes to. */
+typedef struct hap_ahead_stats {
+  double look_ahead_s; /* the session's */
+  uint64_t dropped; /* sum over models: bodies and contacts that were met without room for them */
+  uint32_t dropped_now; /* of the newest model */
+  uint32_t reserved;
+} hap_ahead_stats;
+
 /* All of it. */
 typedef struct hap_stats {
   uint32_t size;             /* bytes filled in */
@@ -221,6 +229,7 @@ typedef struct hap_stats {
   hap_safety_stats safety;   /* forces lowered in doubt */
   hap_room_stats room;       /* what a tick has time for */
   hap_event_stats events;    /* what is told */
+  hap_ahead_stats ahead;     /* looking ahead */
 } hap_stats;
 
 /* [any] Copies the statistics into *out. size_of_out: sizeof *out of the caller's build. Each

@@ -70,14 +70,15 @@ bool hapi_guard_usable(const hap_wrench *w)
 }
 
 /* A world that does not answer is felt less and less: a state, which ends with the next model. One
- * tick more than two steps is what an age comes to in good order. */
+ * tick more than two steps is what an age comes to in good order; over a network also the round
+ * trip and its jitter, which both ends have agreed on. */
 static void follow_age(hapi_guard *guard, const hapi_tick_facts *facts)
 {
   double step = facts->physics_period;
   int64_t newest = facts->sent_ns > facts->state_ns ? facts->sent_ns : facts->state_ns;
   double age = 1e-9 * (double)(facts->now_ns - newest);
-  double limit =
-      (2.0 * step > HAPI_SAFETY_AGE_LEAST_S ? 2.0 * step : HAPI_SAFETY_AGE_LEAST_S) + facts->period;
+  double limit = (2.0 * step > HAPI_SAFETY_AGE_LEAST_S ? 2.0 * step : HAPI_SAFETY_AGE_LEAST_S) +
+                 facts->period + facts->look_ahead_s;
   bool stale = facts->model_number != 0 && step > 0.0 && age > limit;
   guard->stale_times += stale && !guard->stale;
   guard->stale_ticks += stale;

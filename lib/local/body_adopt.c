@@ -10,17 +10,29 @@
 #include "local/body_course.h"
 #include "local/body_stay.h"
 
-/* A body that comes in has the world's state, advanced by the age of the model. */
-static void body_enter(hapi_local_body *body, const hapi_model_body *in, double age_s)
+static void twist_advance(double seconds, const double b[6], hap_twist *io)
+{
+  for (int i = 0; i < 3; ++i) {
+    io->linear[i] += seconds * b[i];
+    io->angular[i] += seconds * b[3 + i];
+  }
+}
+
+/* A body that comes in has the world's state, advanced by the age of the model as ticks would have
+ * advanced it: each adds b T to the velocity and goes on with that, so the mean velocity of the age
+ * is that after (age + T) / 2. */
+static void body_enter(hapi_local_body *body, const hapi_model_body *in, double age_s,
+                       double period)
 {
   bool falls = (in->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_RESTING)) == 0;
+  hap_twist mean = in->twist;
   body->pose = in->pose;
   body->twist = in->twist;
-  for (int i = 0; falls && i < 3; ++i) {
-    body->twist.linear[i] += age_s * in->b[i];
-    body->twist.angular[i] += age_s * in->b[3 + i];
+  if (falls) {
+    twist_advance(0.5 * (age_s + period), in->b, &mean);
+    twist_advance(age_s, in->b, &body->twist);
   }
-  hapi_pose_move(&body->pose, &body->twist, age_s);
+  hapi_pose_move(&body->pose, &mean, age_s);
   memset(body->linear.residual, 0, sizeof body->linear.residual);
   memcpy(body->account.residual_taken, in->residual, sizeof body->account.residual_taken);
 }
@@ -114,7 +126,7 @@ static void adopt_contact_body(hapi_local_body *body, const hapi_model_body *in,
       body->twist = in->twist;
     }
   } else if (!owned) {
-    body_enter(body, in, age_s);
+    body_enter(body, in, age_s, before->period);
     add_new_impulse(body, in);
     body->entered_model = number;
   }
@@ -182,7 +194,7 @@ static void adopt_body(hapi_local_body *body, const hapi_model *model, const hap
                ((in->flags & HAPI_BODY_FOLLOWS) == 0 || body->pushed);
   body->epoch = in->epoch;
   if (!keeps) {
-    body_enter(body, in, age_s);
+    body_enter(body, in, age_s, before->period);
     add_new_impulse(body, in);
   }
   bool awake = keeps && (body->flags & HAPI_BODY_RESTING) == 0;

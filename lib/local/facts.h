@@ -33,7 +33,8 @@ typedef struct hapi_tick_facts {
   int64_t state_ns;
   int64_t sent_ns;
   double physics_period; /* s, H; 0: not known */
-  double time_scale;     /* see hapi_model */
+  double look_ahead_s;   /* see hapi_model */
+  double time_scale;     /* likewise */
 } hapi_tick_facts;
 
 #endif

@@ -19,9 +19,9 @@
  * the loop takes them as long as it has room, the soonest first. Bodies that touch each other are
  * taken together or not at all: the range gets no new border here. */
 
-#define LOOK_AHEAD_S 0.5
-#define LOOK_KEEPS 1.2   /* times LOOK_AHEAD_S, for what the loop has: not given back at once */
-#define LOOK_FLOOR 0.005 /* m */
+#define LOOK_AHEAD_S 0.5       /* and what the session looks ahead */
+#define LOOK_KEEPS 1.2         /* times that, for what the loop has: not given back at once */
+#define LOOK_FLOOR 0.005       /* m */
 #define LOOK_ACCELERATION 15.0 /* m/s^2, that a body may have beside its velocity */
 #define STILL_S 0.25           /* at rest for that long: it does not move by itself */
 #define STILL_LEAST 4          /* cycles */
@@ -103,13 +103,14 @@ static void comer_add(hapi_nearby *nearby, uint32_t known, double arrival_s)
 
 static void comers_collect(hapi_nearby *nearby)
 {
+  double look_s = LOOK_AHEAD_S + nearby->cycle->config->look_ahead_s;
   for (uint32_t i = 0; i < nearby->world->bodies.high; ++i) {
     const hapi_known_body *known = known_body(nearby, i);
     if (known->body == NULL || body_is_still(nearby, known) || !body_may_come(nearby, i)) {
       continue;
     }
     double arrival_s = body_arrival(nearby, known);
-    if (arrival_s <= (known->loop_owned ? LOOK_KEEPS : 1.0) * LOOK_AHEAD_S) {
+    if (arrival_s <= (known->loop_owned ? LOOK_KEEPS : 1.0) * look_s) {
       comer_add(nearby, i, arrival_s);
     } else if (known->loop_owned && known->jointed && !body_is_driven(nearby, i)) {
       comer_add(nearby, i, HUGE_VAL); /* until it rests */

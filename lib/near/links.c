@@ -36,7 +36,7 @@ static double surface_speed(const hapi_known_body *known)
 /* s, how long a link must hold: until the model after the next. */
 static double link_life(const hapi_nearby *nearby)
 {
-  return 2.0 * nearby->cycle->probe_step_s;
+  return hapi_cycle_horizon(nearby->cycle, 2.0);
 }
 
 /* How far two surfaces may come nearer until then, where nothing moves before. */

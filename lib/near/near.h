@@ -14,8 +14,10 @@
 
 /* Since the session began, but for the numbers of the newest model. */
 typedef struct hapi_near_counts {
-  uint64_t dropped; /* what found no room: hap_stats.model.capacity_dropped */
-  double range_s;   /* in walks of the range */
+  uint64_t dropped;       /* what found no room: hap_stats.model.capacity_dropped */
+  uint32_t ahead_dropped; /* of the newest model: bodies and contacts without room */
+  uint64_t ahead_all;     /* the sum over models */
+  double range_s;         /* in walks of the range */
   double last_range_s;
   double beyond_s; /* part of range_s: bodies that are no neighbours */
   uint32_t range_bodies;

@@ -144,7 +144,7 @@ void hapi_neighbors_collect(hapi_nearby *nearby)
     double size = is_tool ? pointers[i].extent : pointers[i].radius;
     double speed = hood->fastest + hapi_v3_norm(pointers[i].twist.linear);
     speed += is_tool ? size * hapi_v3_norm(pointers[i].twist.angular) : 0.0;
-    double reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s) +
+    double reach = hapi_neighbors_reach(speed, hapi_cycle_horizon(nearby->cycle, 2.0)) +
                    fmin(deepest_touch(nearby, i), DEPTH_MOST) + hood->feels.reach;
     hood->current_pointer = i;
     hood->current_reach = reach;
@@ -325,8 +325,7 @@ static bool find_nearest(hapi_nearby *nearby, const hapi_candidate *candidate, h
   const hapi_state_pointer *pointer =
       &hapi_state_pointers(nearby->cycle->state)[candidate->pointer];
   const hapi_contact_slot *touch = touch_of(nearby, candidate, pointer);
-  double horizon = nearby->cycle->probe_step_s;
-  double ahead = hapi_cycle_steps_to_now(nearby->cycle) ? 0.0 : horizon;
+  double ahead = hapi_cycle_steps_to_now(nearby->cycle) ? 0.0 : nearby->cycle->probe_step_s;
   double there[3];
   hapi_v3_madd(pointer->pose.position, ahead, pointer->twist.linear, there);
   double radius = pointer->radius;
@@ -340,8 +339,9 @@ static bool find_nearest(hapi_nearby *nearby, const hapi_candidate *candidate, h
   if (!found) {
     return false;
   }
-  hit->reach = hapi_neighbors_reach(
-      hapi_neighbors_speed(nearby, candidate->geom, pointer, out->point_b), horizon);
+  hit->reach =
+      hapi_neighbors_reach(hapi_neighbors_speed(nearby, candidate->geom, pointer, out->point_b),
+                           hapi_cycle_horizon(nearby->cycle, 1.0));
   return out->distance <= hit->reach + nearby->neighbors.feels.reach;
 }
 
@@ -400,11 +400,11 @@ static void place_contact(hapi_nearby *nearby, hapi_contact_slot *slot, const ha
   }
   if (relief && (wish == HAP_EFFECT_ON ||
                  (wish == HAP_EFFECT_AUTO && slot->shape_reason == HAP_REASON_CALLED))) {
-    double step = nearby->cycle->probe_step_s;
     double speed = hapi_neighbors_speed(nearby, hit->geom, pointer, pointer->pose.position);
-    hapi_relief_note(nearby, hit->geom, pointer,
-                     pointer->radius + hapi_neighbors_reach(speed, 2.0 * step),
-                     pointer->radius + REACH_FLOOR + speed * step, slot);
+    double within = hapi_neighbors_reach(speed, hapi_cycle_horizon(nearby->cycle, 2.0));
+    double least = REACH_FLOOR + speed * hapi_cycle_horizon(nearby->cycle, 1.0);
+    hapi_relief_note(nearby, hit->geom, pointer, pointer->radius + within, pointer->radius + least,
+                     slot);
   }
   slot->shape_pose = world;
   if (slot->has_shape && body != NULL) {
@@ -437,6 +437,20 @@ static void say_crowded(hapi_nearby *nearby, const hapi_hit *hit)
   }
 }
 
+/* Once the walk has ended. What it had no room for may be touched before a model comes that has it:
+ * then it answers with its mass, or is not felt. */
+static void ahead_tell(hapi_nearby *nearby)
+{
+  nearby->counts.ahead_all += nearby->counts.ahead_dropped;
+  if (nearby->counts.ahead_dropped > 0 && nearby->cycle->config->look_ahead_s > 0.0) {
+    hapi_say_once(
+        nearby->cycle, &nearby->neighbors.said_ahead,
+        "looking ahead (hap_expert_def.look_ahead) finds more bodies than the session has "
+        "room or a tick has time for: the force may be wrong where they are touched "
+        "(hap_stats.ahead.dropped); give more max_bodies and max_contacts");
+  }
+}
+
 /* Bodies and contacts of the model by their distance alone, also when farther ones hold all places:
  * those lose them then. */
 static uint32_t choose_hits(hapi_nearby *nearby, uint32_t count)
@@ -456,6 +470,7 @@ static uint32_t choose_hits(hapi_nearby *nearby, uint32_t count)
                 (!known || counted || bodies < nearby->cycle->config->max_bodies);
     if (!room) {
       ++nearby->counts.dropped;
+      ++nearby->counts.ahead_dropped;
       say_crowded(nearby, &hits[i]);
       continue;
     }
@@ -633,6 +648,7 @@ void hapi_neighbors_find(hapi_nearby *nearby)
   hapi_neighbors *hood = &nearby->neighbors;
   uint32_t count = 0;
   nearby->tools.count = 0;
+  nearby->counts.ahead_dropped = 0;
   hapi_relief_begin(nearby);
   hapi_slots_begin_model(nearby);
   hapi_slots_hand_over(nearby);
@@ -662,6 +678,7 @@ void hapi_neighbors_find(hapi_nearby *nearby)
   }
   int64_t begin_ns = hapi_clock_now();
   hapi_ahead_range(nearby, count);
+  ahead_tell(nearby);
   nearby->counts.last_range_s =
       1e-9 * (double)(hapi_clock_now() - begin_ns) - nearby->range.links.cover.boxes_s;
   nearby->counts.range_s += nearby->counts.last_range_s;

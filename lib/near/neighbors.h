@@ -50,6 +50,7 @@ typedef struct hapi_neighbors {
   hapi_cover cover;
   hapi_relief relief;
   hapi_feels feels;
+  bool said_ahead;          /* that looking ahead finds no room, once a session */
   bool said_crowded;        /* of what is touched and finds no room, once a session */
   double fastest;           /* m/s, of all awake bodies' surfaces */
   uint32_t current_pointer; /* while ODE calls back */

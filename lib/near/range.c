@@ -31,6 +31,7 @@ bool hapi_range_has_room(hapi_nearby *nearby, uint32_t bodies)
   uint32_t most = hapi_range_most(nearby->cycle);
   bool room = range->owned + bodies <= most;
   range->cut = range->cut || (!room && most < nearby->cycle->config->max_bodies);
+  nearby->counts.ahead_dropped += !room;
   return room;
 }
 
@@ -59,6 +60,7 @@ static bool range_enqueue(hapi_nearby *nearby, uint32_t known)
   uint32_t slot = hapi_slots_body(nearby, known);
   if (slot == HAPI_NONE || range->count == nearby->cycle->config->capacity.bodies) {
     ++nearby->counts.dropped;
+    ++nearby->counts.ahead_dropped;
     return false;
   }
   hapi_body_slot *local = &nearby->slots.bodies[slot];
@@ -460,7 +462,8 @@ static void add_tool_mesh(hapi_nearby *nearby, const hapi_hit *hit)
       .geom = hit->geom,
       .at = pointer->pose.position,
       .extent = pointer->extent,
-      .reach = hapi_neighbors_reach(speed, 2.0 * nearby->cycle->probe_step_s) + hit->said.reach,
+      .reach =
+          hapi_neighbors_reach(speed, hapi_cycle_horizon(nearby->cycle, 2.0)) + hit->said.reach,
       .side = hapi_tool_told(nearby, hit->geom, hit->pointer)};
   uint32_t count = hapi_tool_triangles(nearby, &box, nearby->range.number);
   for (uint32_t i = 0; i < count; ++i) {

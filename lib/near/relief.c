@@ -10,8 +10,9 @@
 #include "near/fields.h"
 #include "near/near.h"
 
-/* Until the model after the next one the pointer may go a long way, over more triangles than a tick
- * can look at. Then those nearest to it are told, and how far they go. */
+/* Until the model after the next one, and what the session looks ahead, the pointer may go a long
+ * way, over more triangles than a tick can look at. Then those nearest to it are told, and how far
+ * they go. */
 
 #define SHRINK 0.8
 #define SLACK_LEAST 1e-3 /* m, beyond the pointer's surface: with less there is no use in them */

@@ -362,10 +362,10 @@ bool hapi_tool_find(hapi_nearby *nearby, const hapi_candidate *candidate, hapi_h
                            .side = hapi_tool_told(nearby, candidate->geom, candidate->pointer),
                            .reach = candidate->reach,
                            .more = nearby->neighbors.feels.reach,
-                           .horizon = nearby->cycle->probe_step_s};
+                           .horizon = hapi_cycle_horizon(nearby->cycle, 1.0)};
   hap_pose pose = pointer->pose;
   if (!hapi_cycle_steps_to_now(nearby->cycle)) {
-    hapi_pose_move(&pose, &pointer->twist, at.horizon);
+    hapi_pose_move(&pose, &pointer->twist, nearby->cycle->probe_step_s);
   }
   for (int attempt = 0; attempt < 2; ++attempt) {
     search_begin(&s, nearby, &at, &pose);
@@ -537,7 +537,7 @@ void hapi_tool_join_hits(hapi_nearby *nearby, uint32_t count)
                  .hull = &hapi_state_hulls(nearby->cycle->state)[hits[i].pointer],
                  .key = tools->points[hits[i].tool_first].tool.at.key,
                  .reach = HUGE_VAL,
-                 .horizon = nearby->cycle->probe_step_s},
+                 .horizon = hapi_cycle_horizon(nearby->cycle, 1.0)},
           .pose = hits[i].tool_pose,
           .first = hits[i].tool_first,
           .count = hits[i].tool_count};

@@ -50,6 +50,9 @@ void hapi_counts_show(hapi_physics *physics)
   shown->room.range_cut = physics->near.range.cut;
   const hapi_near_counts *near = &physics->near.counts;
   shown->model.capacity_dropped += near->dropped;
+  shown->ahead = (hap_ahead_stats){.look_ahead_s = physics->config.look_ahead_s,
+                                   .dropped = near->ahead_all,
+                                   .dropped_now = near->ahead_dropped};
   shown->model.range_bodies = near->range_bodies;
   shown->model.edge_bodies = near->edge_bodies;
   shown->model.measured_bodies = near->measured_bodies;

@@ -403,11 +403,21 @@ static void cycle_run(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
   hapi_physics_send_model(physics);
 }
 
+static void outside_call(const hapi_physics *physics, void (*call)(void *of, int64_t now_ns),
+                         int64_t now_ns)
+{
+  if (call != NULL) {
+    call(physics->calls.of, now_ns);
+  }
+}
+
 void hapi_physics_cycle(hapi_physics *physics, int64_t now_ns, int64_t next_ns)
 {
+  outside_call(physics, physics->calls.before, now_ns);
   hapi_lock_enter(&physics->lock);
   hapi_tape_cycle(&physics->tape, &physics->wanted, now_ns, next_ns);
   cycle_run(physics, now_ns, next_ns);
   hapi_tape_cycled(&physics->tape, &physics->cycle);
   hapi_lock_leave(&physics->lock);
+  outside_call(physics, physics->calls.after, now_ns);
 }

@@ -67,6 +67,22 @@ int64_t hapi_physics_last_cycle(const hapi_physics *physics);
 double hapi_physics_period(const hapi_physics *physics);
 double hapi_physics_next_period(const hapi_physics *physics);
 
+/* What is done before and after each cycle, in its thread; members may be NULL. */
+typedef struct hapi_physics_calls {
+  void *of;
+  void (*before)(void *of, int64_t now_ns);
+  void (*after)(void *of, int64_t now_ns);
+} hapi_physics_calls;
+
+/* [control] Before begin. */
+void hapi_physics_set_calls(hapi_physics *physics, const hapi_physics_calls *calls);
+/* [control] Before begin: an exchange of the same capacity in place of that of the config. */
+void hapi_physics_set_exchange(hapi_physics *physics, hapi_exchange *exchange);
+
+/* [any] Another loop sends states from now on: its totals begin at zero, and it knows no body.
+ * Before the next cycle takes one. */
+void hapi_physics_renew_loop(hapi_physics *physics);
+
 /* [control] LOCKSTEP: time from a cycle to the use of its model; negative: the model's own. */
 void hapi_physics_set_latency(hapi_physics *physics, double seconds);
 

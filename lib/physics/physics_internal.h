@@ -73,6 +73,7 @@ struct hapi_physics {
   hapi_wanted wanted;
   hapi_edits edits;
   hapi_world_lock lock;
+  hapi_physics_calls calls;
   hapi_pace pace;
   bool world_faulty; /* holds a state that ODE would abort on: not stepped */
   double late_s;     /* of cycles that took longer than their period, one after the other */

@@ -478,6 +478,7 @@ void hapi_physics_make_model(hapi_physics *physics, int64_t state_ns, int64_t va
   out->sent_ns = hapi_tape_sent(&physics->tape, cycle);
   out->period_s = hapi_cycle_period(
       cycle, hapi_tape_wanted_model(&physics->tape, &physics->wanted, cycle, true));
+  out->look_ahead_s = cycle->config->look_ahead_s;
   out->time_scale = cycle->time_scale;
   out->tick_budget_ns = hapi_dial_tick_budget(&physics->dial, physics->config.haptic_hz);
   hapi_model_body *bodies = hapi_model_bodies(out);

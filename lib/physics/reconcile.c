@@ -35,6 +35,13 @@ void hapi_account_reset(hapi_account *account)
   memset(account->bodies, 0, account->capacity * sizeof *account->bodies);
 }
 
+void hapi_account_renew(hapi_account *account)
+{
+  hapi_account_reset(account);
+  hapi_v3_copy(account->counts.hand_impulse, account->counts.hand_before);
+  memset(account->counts.owned_taken, 0, sizeof account->counts.owned_taken);
+}
+
 /* ---- in and out ---- */
 
 /* What the newest message says of the body of a slot; NULL: nothing. */
@@ -173,7 +180,8 @@ static void take_body(hapi_account *account, uint32_t index)
 void hapi_reconcile_take(hapi_account *account)
 {
   HAPI_ASSERT(account->cycle->has_new_state && account->cycle->state != NULL);
-  hapi_v3_copy(account->cycle->state->hand_impulse, account->counts.hand_impulse);
+  hapi_v3_add(account->counts.hand_before, account->cycle->state->hand_impulse,
+              account->counts.hand_impulse);
   /* Bodies that the loop owns got their share in the loop: ODE takes their velocity, not an
    * impulse. */
   hapi_account_counts *f = &account->counts;
@@ -228,14 +236,16 @@ static void set_state(const hapi_body_slot *slot, dBodyID body, const hap_pose *
 }
 
 /* A body that the loop has let go since the last message. It did so some ticks after the time that
- * ODE's state is for: back by that, as the step to come goes over the whole interval. */
+ * ODE's state is for: back by that, as the step to come goes over the whole interval. A message
+ * that was long on its way tells of a time before: on by that. */
 static void take_last_state(const hapi_account *account, const hapi_slot_account *of,
                             const hapi_body_slot *slot, dBodyID body, const hapi_state_body *in)
 {
   hap_pose pose = in->owned_pose;
   double since = account->cycle->step_scale * 1e-9 *
                  (double)(in->owned_until_ns - account->cycle->last_cycle_ns);
-  since = since > account->cycle->step_s ? account->cycle->step_s : since < 0.0 ? 0.0 : since;
+  double late = account->cycle->step_scale * account->cycle->config->look_ahead_s;
+  since = since > account->cycle->step_s ? account->cycle->step_s : since < -late ? -late : since;
   hapi_v3_madd(pose.position, -since, in->owned_twist.linear, pose.position);
   hap_twist twist = in->owned_twist;
   if ((in->flags & HAPI_BODY_TOUCHED) == 0) { /* it fell: the step gives it that again */

@@ -80,6 +80,7 @@ typedef struct hapi_file_info {
   int32_t iterations;
   int32_t more_substeps; /* hap_expert_def.substeps - 1 */
   double reuse;
+  double look_ahead;
 } hapi_file_info;
 
 #define HAPI_FILE_INFO_LEAST offsetof(hapi_file_info, max_sweeps)

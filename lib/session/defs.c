@@ -146,6 +146,7 @@ static hap_status def_check(const hap_session_def *def, hap_detail *detail)
       HAPI_RULE(expert, max_hull_points, 0, 1048576),
       HAPI_RULE(expert, lookback, 0.0, 0.5),
       HAPI_RULE(expert, substeps, 1, 64),
+      HAPI_RULE(expert, look_ahead, 0.0, HAP_LOOK_AHEAD_MOST),
       HAPI_RULE_OR(expert, contact_hz, HAP_BY_ACCURACY, 20.0, 1000.0),
       HAPI_RULE_OR(expert, max_sweeps, HAP_BY_ACCURACY, 0, 10000),
       HAPI_RULE_OR(expert, range_hops, HAP_BY_ACCURACY, HAP_RANGE_ALL, 1024),

@@ -103,6 +103,10 @@ void hapi_session_free(hap_session *session)
   }
   hapi_physics_destroy(session->physics);
   hapi_contact_destroy(session->contact);
+  hapi_exchange_destroy(session->ferry.exchange);
+  if (session->ferry.free != NULL) {
+    session->ferry.free(session);
+  }
   if (!stuck) {
     hapi_exchange_destroy(session->exchange);
     hapi_recorder_destroy(session->recorder);
@@ -139,24 +143,53 @@ static bool may_run(hap_session *session)
          !hapi_physics_lock_is_mine(session->physics);
 }
 
+static void ferry_call(const hap_session *session, void (*call)(void *of, int64_t now_ns),
+                       int64_t now_ns)
+{
+  if (call != NULL) {
+    call(session->ferry.of, now_ns);
+  }
+}
+
+static bool has_loop(const hap_session *session)
+{
+  return session->ferry.side != HAPI_SIDE_WORLD;
+}
+
+static bool has_world(const hap_session *session)
+{
+  return session->ferry.side != HAPI_SIDE_LOOP;
+}
+
+/* *out_which: the thread that is to be told of where one does not start. */
+static hap_status threads_run(hap_session *session, const char **out_which)
+{
+  *out_which = "haptic";
+  if (has_loop(session)) {
+    HAPI_TRY(hapi_haptic_start_thread(session->haptic));
+  }
+  *out_which = "physics";
+  if (has_world(session) && session->def.drive == HAP_DRIVE_THREADS) {
+    HAPI_TRY(hapi_physics_start_thread(session->physics));
+  }
+  *out_which = "contact";
+  if (has_loop(session)) {
+    HAPI_TRY(hapi_contact_start_thread(session->contact));
+  }
+  *out_which = "network";
+  return session->ferry.start != NULL ? session->ferry.start(session) : HAP_OK;
+}
+
 static hap_status start_threads(hap_session *session)
 {
-  const char *which = "haptic";
-  hap_status status = hapi_haptic_start_thread(session->haptic);
-  if (status >= HAP_OK && session->def.drive == HAP_DRIVE_THREADS) {
-    which = "physics";
-    status = hapi_physics_start_thread(session->physics);
-  }
-  if (status >= HAP_OK) {
-    which = "contact";
-    status = hapi_contact_start_thread(session->contact);
-  }
+  const char *which = NULL;
+  hap_status status = threads_run(session, &which);
   if (status < HAP_OK) {
     return hapi_session_fail(
         session, status, "the %s thread could not be started: %s%s", which, strerror(errno),
         errno == EAGAIN ? " (a limit of threads or memory: ulimit -u, -v)" : "");
   }
-  bool wanted = session->def.rt_priority > 0;
+  bool wanted = session->def.rt_priority > 0 && has_loop(session);
   bool given = hapi_haptic_is_realtime(session->haptic) && session->memory_locked;
   return wanted && !given ? HAP_NO_REALTIME : HAP_OK;
 }
@@ -165,16 +198,26 @@ static hap_status session_begin(hap_session *session, hap_detail *detail)
 {
   int64_t start_ns = session->def.drive == HAP_DRIVE_LOCKSTEP ? 0 : hapi_clock_now();
   hapi_exchange_reset(session->exchange);
+  if (session->ferry.exchange != NULL) {
+    hapi_exchange_reset(session->ferry.exchange);
+  }
   HAPI_TRY(session->player != NULL ? hapi_play_begin(session, &start_ns, detail)
                                    : hapi_record_begin(session, detail));
-  HAPI_TRY(hapi_haptic_begin(session->haptic, start_ns, detail));
-  HAPI_TRY(hapi_physics_begin(session->physics, &start_ns, detail));
+  if (has_loop(session)) {
+    HAPI_TRY(hapi_haptic_begin(session->haptic, start_ns, detail));
+  }
+  if (has_world(session)) {
+    HAPI_TRY(hapi_physics_begin(session->physics, &start_ns, detail));
+    ferry_call(session, session->ferry.after_cycle, start_ns);
+  }
   /* The first local model, and the first contacts: the first tick has both. */
-  hapi_haptic_set_start(session->haptic, start_ns);
-  hapi_contact_begin(session->contact, start_ns);
-  hapi_haptic_receive(session->haptic, start_ns);
-  hapi_contact_pass(session->contact, start_ns);
-  hapi_haptic_receive(session->haptic, start_ns);
+  if (has_loop(session)) {
+    hapi_haptic_set_start(session->haptic, start_ns);
+    hapi_contact_begin(session->contact, start_ns);
+    hapi_haptic_receive(session->haptic, start_ns);
+    hapi_contact_pass(session->contact, start_ns);
+    hapi_haptic_receive(session->haptic, start_ns);
+  }
   atomic_store(&session->tick, 0);
   session->base = session->step = session->pass_tick = 0;
   session->frame_remainder_s = 0.0;
@@ -194,6 +237,12 @@ hap_status hap_session_start(hap_session *session)
   if (!may_run(session) || hapi_physics_lock(session->physics, -1) < HAP_OK) {
     return hapi_session_fail(session, HAP_ERROR_THREAD,
                              "start in a callback or while this thread holds the lock");
+  }
+  if (session->ran && session->ferry.own != NULL) {
+    (void)hapi_physics_unlock(session->physics);
+    return hapi_session_fail(session, HAP_ERROR_STATE,
+                             "a session that is served or connected is started once: the other "
+                             "end would take it for the same; create it anew");
   }
   if (session->ran && session->player != NULL) {
     (void)hapi_physics_unlock(session->physics);
@@ -230,6 +279,9 @@ hap_status hap_session_stop(hap_session *session)
   }
   bool ended = hapi_haptic_end(session->haptic); /* first: the hand is let go */
   hapi_contact_stop_thread(session->contact);
+  if (session->ferry.stop != NULL) {
+    session->ferry.stop(session);
+  }
   hapi_physics_end(session->physics);
   if (!ended) {
     hap_detail where;
@@ -377,8 +429,8 @@ static void find_contacts_when_due(hap_session *session)
 /* False: the loop is stopped in this tick's time. */
 static bool tick_runs(const hap_session *session)
 {
-  uint64_t turn = session->run_ticks + session->stop_ticks;
-  return session->stop_ticks == 0 || session->tick % turn < session->run_ticks;
+  uint64_t turn = session->pulses.run_ticks + session->pulses.stop_ticks;
+  return session->pulses.stop_ticks == 0 || session->tick % turn < session->pulses.run_ticks;
 }
 
 hap_status hap_session_advance(hap_session *session, uint64_t ticks)
@@ -401,15 +453,21 @@ hap_status hap_session_advance(hap_session *session, uint64_t ticks)
   }
   for (uint64_t i = 0; i < ticks; ++i) {
     int64_t now = time_of(session, session->tick);
-    bool runs = tick_runs(session);
+    bool runs = has_loop(session) && tick_runs(session);
     if (runs) {
+      ferry_call(session, session->ferry.before_tick, now);
       hapi_haptic_receive(session->haptic, now);
     }
-    step_when_due(session);
-    find_contacts_when_due(session);
+    if (has_world(session)) {
+      step_when_due(session);
+    }
+    if (has_loop(session)) {
+      find_contacts_when_due(session);
+    }
     if (runs) {
       hapi_haptic_cycle(session->haptic, now);
-    } else {
+      ferry_call(session, session->ferry.after_tick, now);
+    } else if (has_loop(session)) {
       hapi_haptic_count_missed(session->haptic, 1);
     }
     atomic_fetch_add_explicit(&session->tick, 1, memory_order_relaxed);

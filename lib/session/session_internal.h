@@ -13,10 +13,13 @@
 #include <hapode/session.h>
 
 #include "base/def.h"
+#include "base/thread.h"
 #include "contact/contact.h"
 #include "haptic/haptic.h"
 #include "physics/physics.h"
 #include "record/recorder.h"
+#include "remote/loop_end.h"
+#include "remote/world_end.h"
 #include "sync/exchange.h"
 #include "sync/texture.h"
 
@@ -28,11 +31,44 @@ typedef struct hapi_session_gone {
   void *arg;
 } hapi_session_gone;
 
+typedef struct hapi_remote hapi_remote;
+
+/* Carries the messages between physics and the loop where each has an exchange of its own. Those of
+ * cycles are called by whoever runs the cycle, those of ticks in drive LOCKSTEP alone. */
+typedef enum hapi_side {
+  HAPI_SIDE_BOTH,
+  HAPI_SIDE_WORLD, /* the session has no loop: physics alone runs */
+  HAPI_SIDE_LOOP   /* the session has no world: loop and contact thread alone run */
+} hapi_side;
+
+typedef struct hapi_ferry {
+  hapi_side side;
+  hapi_exchange *exchange; /* of physics; NULL: it has the loop's, and nothing is carried */
+  void *of;
+  void (*before_cycle)(void *of, int64_t now_ns); /* the loop's newest state to physics */
+  void (*after_cycle)(void *of, int64_t now_ns);  /* model and near away from physics */
+  void (*before_tick)(void *of, int64_t now_ns);  /* model and near to the loop */
+  void (*after_tick)(void *of, int64_t now_ns);   /* the state away from the loop */
+  struct hapi_far *far; /* the ends that are the ferry; NULL: something else is */
+  hapi_remote *own;     /* what serve or connect have made; else NULL */
+  /* A thread of its own, in drives with threads; stop is idempotent. NULL: it needs none. */
+  hap_status (*start)(hap_session *session);
+  void (*stop)(hap_session *session);
+  void (*free)(hap_session *session); /* own */
+} hapi_ferry;
+
+/* For tests and the bench: after run_ticks, stop_ticks are left out; 0: none. */
+typedef struct hapi_pulses {
+  uint32_t run_ticks;
+  uint32_t stop_ticks;
+} hapi_pulses;
+
 struct hap_session {
   hap_session_def def; /* its expert and research are the next two */
   hap_expert_def expert;
   hap_research_def research;
-  hapi_exchange *exchange;
+  hapi_exchange *exchange; /* of the loop, and of physics where there is no other */
+  hapi_ferry ferry;
   hapi_haptic *haptic;
   hapi_textures *textures;
   hapi_physics *physics;
@@ -47,9 +83,7 @@ struct hap_session {
   uint64_t step;
   uint64_t pass_tick; /* of the next one of the contact thread's part */
 
-  /* LOCKSTEP, for tests and the bench: after run_ticks, stop_ticks are left out; 0: none */
-  uint32_t run_ticks;
-  uint32_t stop_ticks;
+  hapi_pulses pulses; /* LOCKSTEP */
 
   double frame_remainder_s; /* FRAME */
   pthread_t starter;        /* thread of the last start */
@@ -82,6 +116,29 @@ hap_status hapi_session_say(const hap_session *session, hap_status status, const
 hap_status hapi_session_may_change(const hap_session *session);
 /* What create has made; stopped before. */
 void hapi_session_free(hap_session *session);
+
+/* session_far.c: physics and the loop do not share memory from the next start on: the ferry brings
+ * what one tells the other. HAP_ERROR_STATE: started already. HAP_ERROR_UNSUPPORTED: another drive
+ * than LOCKSTEP, another model than CONTACT, looking back, which reads the loop's path, or an
+ * application that is asked about contacts. */
+hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry);
+
+/* A session's part of a world and a loop that are far from each other: of one side, or of both for
+ * tests. The caller fills in links and codecs. */
+typedef struct hapi_far {
+  hapi_world_end world;
+  hapi_loop_end loop;
+  bool lockstep;
+  pthread_mutex_t lock; /* between the end's thread and those who ask how it goes */
+  /* Of a loop's end in drive THREADS. */
+  hapi_thread thread;
+  _Atomic int stop;
+} hapi_far;
+
+/* The ends of that side as the session's ferry. *far outlives the session; finish comes after it.
+ * Errors as above, and HAP_ERROR_MEMORY. */
+hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
+void hapi_far_finish(hapi_far *far); /* begun before */
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */

@@ -111,6 +111,11 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
   hap_detail detail = {""};
   hapi_pointer_setup setup = {0};
   out->v = 0;
+  if (session->ferry.side == HAPI_SIDE_WORLD) {
+    return hapi_session_fail(session, HAP_ERROR_STATE,
+                             "the session serves its world, and has no loop: hands are those of "
+                             "the session that joins (hap_session_connect)");
+  }
   hap_status status = hapi_session_read_pointer(def, &setup, &detail);
   if (status >= HAP_OK) {
     status = hapi_session_check_coupling(session, &setup, &detail);

@@ -94,10 +94,10 @@ typedef struct file_member {
   }
 
 static const file_member file_members[] = {
-    SESSION(model),        SESSION(physics_hz),   SESSION(haptic_hz),     SESSION(max_bodies),
-    SESSION(max_contacts), SESSION(max_pointers), SESSION(accuracy),      EXPERT(contact_hz),
-    EXPERT(max_sweeps),    EXPERT(iterations),    EXPERT(reuse),          EXPERT(max_hull_points),
-    RESEARCH(probe),       RESEARCH(guard),       RESEARCH(impulse_pose),
+    SESSION(model),        SESSION(physics_hz),   SESSION(haptic_hz), SESSION(max_bodies),
+    SESSION(max_contacts), SESSION(max_pointers), SESSION(accuracy),  EXPERT(contact_hz),
+    EXPERT(max_sweeps),    EXPERT(iterations),    EXPERT(reuse),      EXPERT(max_hull_points),
+    EXPERT(look_ahead),    RESEARCH(probe),       RESEARCH(guard),    RESEARCH(impulse_pose),
 };
 
 static_assert(sizeof(hap_model) == sizeof(int32_t), "enums are in the file as they are");

@@ -325,6 +325,17 @@ hapi_trail *hapi_exchange_trail(hapi_exchange *exchange)
   return &exchange->trail;
 }
 
+const hapi_capacity *hapi_exchange_capacity(const hapi_exchange *exchange)
+{
+  return &exchange->capacity;
+}
+
+size_t hapi_exchange_message_size(const hapi_exchange *exchange, hapi_channel name)
+{
+  HAPI_ASSERT_INDEX(name, HAPI_CHANNELS);
+  return exchange->channels[name].size;
+}
+
 void *hapi_exchange_memory(hapi_exchange *exchange, size_t *out_size)
 {
   *out_size = exchange->size;

@@ -98,6 +98,10 @@ hap_status hapi_exchange_play_status(const hapi_exchange *exchange);
 hapi_trail *hapi_exchange_trail(hapi_exchange *exchange);
 hapi_path *hapi_exchange_path(hapi_exchange *exchange); /* [haptic] -> [physics] */
 
+const hapi_capacity *hapi_exchange_capacity(const hapi_exchange *exchange);
+/* Bytes of one message. Those of two exchanges of the same capacity are laid out alike. */
+size_t hapi_exchange_message_size(const hapi_exchange *exchange, hapi_channel name);
+
 /* The whole block, for locking it into memory. */
 void *hapi_exchange_memory(hapi_exchange *exchange, size_t *out_size);
 

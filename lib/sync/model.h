@@ -231,6 +231,7 @@ typedef struct hapi_model {
   int64_t sent_ns;       /* drive FRAME: when physics computed, state_ns or later; else 0 */
   double blend_s;        /* model IMPULSE, interpolated: how long a body takes to its new pose */
   double period_s;       /* H, of the next step */
+  double look_ahead_s;   /* by which the message may come later than without a network */
   double time_scale;     /* what passes for bodies in a second; theirs here is the hand's time */
   hap_model model;
   hap_impulse_pose impulse_pose;

@@ -11,6 +11,8 @@
 #include "pointer/coupling.h"
 #include "tick/tick.h"
 
+#define AGE_MOST_S 0.1 /* over which a body is carried on; and what the session looks ahead */
+
 /* Nothing that is near: nothing can be touched before the next sync, and nothing be given. */
 static bool model_observes(const hapi_pointers *pointers, const hapi_model *model)
 {
@@ -71,7 +73,8 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   hapi_solver *solver = &tick->rows.solver;
   hapi_tick_watch *watch = &tick->watch;
   double age_s = 1e-9 * (double)(now_ns - model->state_ns);
-  age_s = age_s > 0.1 ? 0.1 : age_s < -0.1 ? -0.1 : age_s;
+  double age_most_s = AGE_MOST_S + model->look_ahead_s;
+  age_s = age_s > age_most_s ? age_most_s : age_s < -AGE_MOST_S ? -AGE_MOST_S : age_s;
   HAPI_ASSERT(model->body_count <= tick->capacity.bodies);
   HAPI_ASSERT(model->joint_count <= tick->capacity.joints);
   HAPI_ASSERT(model->cross_count <= tick->capacity.crosses);
@@ -104,6 +107,7 @@ void hapi_tick_adopt(hapi_tick *tick, hapi_model *model, int64_t now_ns)
   facts->state_ns = model->state_ns;
   facts->sent_ns = model->sent_ns;
   facts->physics_period = model->period_s;
+  facts->look_ahead_s = model->look_ahead_s;
   facts->time_scale = model->time_scale;
   watch->count = model->watch_count;
   memcpy(watch->slot, model->watch_slot, sizeof watch->slot);

@@ -54,6 +54,7 @@ typedef struct hapi_physics_config {
   uint32_t effects; /* wishes at the start, base/wishes.h */
   double physics_hz;
   double haptic_hz;
+  double look_ahead_s;   /* beyond the next sync, for which bodies are looked for */
   double lookback_share; /* of the period of physics, that the error estimate may take; 0: none */
   bool lockstep;
   bool frame; /* drive FRAME: a cycle may come later than the time that it is for */

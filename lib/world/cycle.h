@@ -39,6 +39,13 @@ static inline bool hapi_cycle_steps_to_now(const hapi_cycle *cycle)
   return cycle->model != HAP_MODEL_IMPULSE;
 }
 
+/* s, for which what may come to touch is of interest: so many steps, and what the session looks
+ * ahead beyond them. */
+static inline double hapi_cycle_horizon(const hapi_cycle *cycle, double steps)
+{
+  return steps * cycle->probe_step_s + cycle->config->look_ahead_s;
+}
+
 /* s, from a cycle of this model to the next. */
 static inline double hapi_cycle_period(const hapi_cycle *cycle, hap_model model)
 {

@@ -20,6 +20,7 @@ INPUT_MAX_OF = {
     "scene_file": 2000,  # a robot of two bodies has 900
     "recording": 1200,  # what it was made with takes 350 of them
     "spidar_model": 2500,  # a whole file of eight strings has 2000
+    "wire": 4000,  # a whole world of a few bodies has 3000
 }
 SECONDS = 60
 

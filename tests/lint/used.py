@@ -19,6 +19,7 @@ NO_PAGE = {
 # Function: why no program of examples/ shows it.
 NO_PROGRAM = {
     "hapode_device_module": "a module is no program: plugins/skeleton is the example",
+    "hap_link_create": "a transport is no program: lib/link/link_local.c is the example",
 }
 
 

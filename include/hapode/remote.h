@@ -1,0 +1,65 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_REMOTE_H
+#define HAPODE_REMOTE_H
+
+/* Hands far from the world: a session with a world and no hand, and a session with a hand and no
+ * world, with a link between them (docs/remote.md). Model CONTACT. One hand's session at a time.
+ *
+ * Both sessions have the same max_bodies, max_contacts, max_pointers, max_hull_points and
+ * haptic_hz. hap_expert_def.look_ahead of the world's is the round trip and its jitter. */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <hapode/attributes.h>
+#include <hapode/link.h>
+#include <hapode/session.h>
+#include <hapode/status.h>
+
+HAP_BEGIN_DECLS
+
+/* [control] The session has the world alone: its hand is in the session of whoever joins. Before
+ * start, and without pointers. The link is borrowed: it belongs to the physics thread while the
+ * session runs, and is closed after hap_session_destroy. Drives THREADS, FRAME and LOCKSTEP.
+ *
+ * When the hand's session leaves, its bodies are the world's again. Another one may join then. A
+ * session that is served or connected is started once.
+ *
+ * HAP_ERROR_ARGUMENT: a NULL. HAP_ERROR_STATE: started already. HAP_ERROR_UNSUPPORTED: another
+ * model than CONTACT, looking back, a contact callback, or a session that is recorded or played;
+ * hap_session_detail says which. HAP_ERROR_MEMORY. */
+HAP_NODISCARD HAP_API hap_status hap_session_serve(hap_session *session, hap_link *link);
+
+/* [control] The session has hands alone: the world is that of the server at the other end. What
+ * the session was created over stays as it is, and may be empty. Before start; the link is borrowed
+ * likewise, and belongs to a thread of the session. Drives THREADS and LOCKSTEP.
+ *
+ * Nothing is felt until the server has answered. Without answers the force fades within 100 ms,
+ * once the world is older than two steps and the server's look_ahead. When the server has gone, the
+ * session is made anew to join again. Errors as above. */
+HAP_NODISCARD HAP_API hap_status hap_session_connect(hap_session *session, hap_link *link);
+
+/* How a session of hap_session_serve or hap_session_connect goes. It has a size and may grow at its
+ * end. */
+typedef struct hap_remote_state {
+  uint32_t size;            /* bytes filled in */
+  uint32_t joined;          /* 1: the other session is there, and both fit */
+  uint64_t joins;           /* of hands' sessions so far; of a hand's session 0 or 1 */
+  uint64_t refused;         /* messages that were not understood, or from somebody else */
+  uint64_t failed;          /* messages that could not be sent */
+  double look_ahead;        /* s, of the world's session; before it is known the session's own */
+  double round_trip_s;      /* hand's session: the shortest of the last 16; 0: none yet */
+  double clock_ahead_s;     /* hand's session: the world's clock - the session's */
+  hap_link_figures figures; /* of the link */
+} hap_remote_state;
+
+/* [any] HAP_ERROR_ARGUMENT: a NULL, or no room for the size. HAP_ERROR_STATE: the session is
+ * neither served nor connected. detail, which may be NULL: why the newest message was refused or
+ * failed; "" when none was. */
+HAP_API hap_status hap_session_remote_state(hap_session *session, hap_remote_state *out,
+                                            size_t size_of_out, hap_detail *detail);
+
+HAP_END_DECLS
+
+#endif

@@ -1,0 +1,147 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "remote/loop_end.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "base/alloc.h"
+#include "base/log.h"
+
+hap_status hapi_loop_end_begin(hapi_loop_end *loop)
+{
+  uint32_t bodies = hapi_exchange_capacity(loop->exchange)->bodies;
+  loop->left = hapi_alloc_array(bodies, sizeof *loop->left);
+  return loop->left != NULL ? HAP_OK : HAP_ERROR_MEMORY;
+}
+
+void hapi_loop_end_finish(hapi_loop_end *loop)
+{
+  hapi_free(loop->left);
+  loop->left = NULL;
+}
+
+/* ---- the clocks: messages have the world's; 0 is no time ---- */
+
+static int64_t earlier_of(int64_t a, int64_t b)
+{
+  return a < b ? a : b;
+}
+
+/* No model is of the future, whatever it says: the guard would take it for new for as long. */
+static void model_shift(int64_t offset_ns, int64_t now_ns, hapi_model *io)
+{
+  io->state_ns = earlier_of(io->state_ns - offset_ns, now_ns);
+  io->valid_from_ns = earlier_of(io->valid_from_ns - offset_ns, now_ns);
+  io->sent_ns = io->sent_ns != 0 ? earlier_of(io->sent_ns - offset_ns, now_ns) : 0;
+}
+
+static void state_shift(hapi_loop_end *loop, int64_t offset_ns, hapi_state *io)
+{
+  io->now_ns += offset_ns;
+  for (uint32_t i = 0; i < io->body_high; ++i) {
+    hapi_state_body *body = &hapi_state_bodies(io)[i];
+    hapi_loop_left *left = &loop->left[i];
+    if (body->owned_until_ns == 0) {
+      continue;
+    }
+    if (left->until_ns != body->owned_until_ns) {
+      *left = (hapi_loop_left){body->owned_until_ns, body->owned_until_ns + offset_ns};
+    }
+    body->owned_until_ns = left->told_ns;
+  }
+}
+
+/* ---- in ---- */
+
+static void loop_hear(void *of, const hap_link_event *event)
+{
+  hapi_loop_end *loop = of;
+  hap_detail why = {""};
+  if (event->kind == HAP_LINK_JOINED) {
+    loop->end.joined = true;
+    loop->end.peer = event->peer;
+  } else if (event->kind == HAP_LINK_LEFT) {
+    loop->end.joined = loop->agreed = false;
+  } else if (event->channel == HAPI_STAMPS_CHANNEL) {
+    if (!hapi_stamps_take(&loop->stamps, event->data, event->bytes, event->arrived_ns)) {
+      snprintf(why.text, sizeof why.text, "it is no answer about the time");
+      hapi_end_refuse(&loop->end, &why);
+    }
+  } else {
+    hapi_terms terms;
+    if (hapi_terms_read(event->data, event->bytes, &terms, &why) < HAP_OK ||
+        hapi_terms_compare(&loop->terms, &terms, &why) < HAP_OK) {
+      hapi_end_refuse(&loop->end, &why);
+      return;
+    }
+    loop->terms = terms;
+    loop->agreed = true;
+    loop->next_ns = loop->end.now_ns;
+  }
+}
+
+/* A step more is what the world looks ahead by itself, beside what the loop may be late. */
+static void trip_judge(hapi_loop_end *loop, int64_t trip_ns)
+{
+  double trip_s = 1e-9 * (double)trip_ns;
+  if (!loop->said_far && loop->stamps.count >= HAPI_STAMPS_KEPT &&
+      trip_s > loop->terms.look_ahead_s + loop->terms.period_s) {
+    loop->said_far = true;
+    hapi_log(HAP_LOG_WARNING,
+             "the world is %.0f ms away and back, and looks ahead by %.0f ms: bodies are felt late "
+             "or not at all; give its session more look_ahead",
+             1e3 * trip_s, 1e3 * loop->terms.look_ahead_s);
+  }
+}
+
+void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns)
+{
+  hapi_model *model = hapi_exchange_model_back(loop->exchange);
+  hapi_near *near = hapi_exchange_near_back(loop->exchange);
+  void *const messages[2] = {model, near};
+  loop->end.now_ns = now_ns;
+  hapi_end_poll(&loop->end, loop_hear, loop);
+  if (!loop->agreed || loop->stamps.count == 0 ||
+      !loop->end.codec.give(loop->end.codec.self, messages)) {
+    return;
+  }
+  if (model->number <= loop->number) {
+    ++loop->old;
+    return;
+  }
+  loop->number = model->number;
+  model->look_ahead_s = loop->terms.look_ahead_s; /* whatever a message says */
+  int64_t trip_ns;
+  model_shift(hapi_stamps_offset(&loop->stamps, &trip_ns), now_ns, model);
+  trip_judge(loop, trip_ns);
+  hapi_exchange_near_publish(loop->exchange);
+  hapi_exchange_model_publish(loop->exchange);
+}
+
+/* ---- out ---- */
+
+void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns)
+{
+  unsigned char question[HAPI_STAMPS_QUESTION];
+  loop->end.now_ns = now_ns;
+  if (loop->agreed && hapi_stamps_ask(&loop->stamps, now_ns, question)) {
+    hapi_end_send_stamps(&loop->end, question, sizeof question);
+  }
+  if (!loop->agreed || now_ns < loop->next_ns) {
+    return;
+  }
+  hapi_state *state = hapi_exchange_state_take(loop->exchange);
+  void *const messages[2] = {state, NULL};
+  if (state == NULL) {
+    return;
+  }
+  int64_t trip_ns;
+  if (loop->stamps.count > 0) { /* before, no body is the loop's, and hands can be told already */
+    state_shift(loop, hapi_stamps_offset(&loop->stamps, &trip_ns), state);
+  }
+  hapi_end_send(&loop->end, messages);
+  int64_t period_ns = llround(1e9 * loop->terms.period_s);
+  loop->next_ns += period_ns;
+  loop->next_ns = loop->next_ns <= now_ns ? now_ns + period_ns : loop->next_ns;
+}

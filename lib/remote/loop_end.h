@@ -1,0 +1,41 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_REMOTE_LOOP_END_H
+#define HAPODE_REMOTE_LOOP_END_H
+
+/* The loop's end of a session whose world is elsewhere: the exchange of loop and contact thread on
+ * one side, the client's link on the other. */
+
+#include "remote/end.h"
+#include "sync/exchange.h"
+
+/* When the loop let go of a body, in its own clock and as the world was told. The world tells one
+ * such time from another by its value, so it stays when the clocks are compared anew. */
+typedef struct hapi_loop_left {
+  int64_t until_ns;
+  int64_t told_ns;
+} hapi_loop_left;
+
+typedef struct hapi_loop_end {
+  hapi_end end;
+  hapi_exchange *exchange; /* of the loop */
+  bool agreed;             /* terms have come, and are good */
+  hapi_terms terms;        /* before: what the loop has */
+  uint64_t number;         /* of the newest model given */
+  uint64_t old;            /* models that came behind a newer one */
+  int64_t next_ns;         /* when the state is due */
+  hapi_stamps stamps;
+  bool said_far;        /* that the world does not look ahead far enough */
+  hapi_loop_left *left; /* by slot of a body */
+} hapi_loop_end;
+
+/* [control] The exchange is set. HAP_ERROR_MEMORY. */
+hap_status hapi_loop_end_begin(hapi_loop_end *loop);
+void hapi_loop_end_finish(hapi_loop_end *loop); /* zeroed allowed */
+
+/* Between ticks: a newer model and its pairs to the loop and the contact thread. */
+void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns);
+/* Between ticks: once a step of physics the newest state to the world. */
+void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns);
+
+#endif

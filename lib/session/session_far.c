@@ -1,0 +1,173 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "session/session_internal.h"
+
+#include "base/clock.h"
+#include "base/log.h"
+
+/* Physics and loop without memory in common: what one knows of the other comes in messages. */
+
+static hap_status far_check(const hap_session *session)
+{
+  const hap_session_def *def = &session->def;
+  const char *what = def->model != HAP_MODEL_CONTACT       ? "another model than contact"
+                     : def->expert->lookback > 0.0         ? "looking back"
+                     : hapi_physics_asks(session->physics) ? "a contact callback"
+                     : session->player != NULL             ? "a replay"
+                                                           : NULL;
+  return what == NULL ? HAP_OK
+                      : hapi_session_fail(session, HAP_ERROR_UNSUPPORTED,
+                                          "%s does not go with a loop far from its world", what);
+}
+
+hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
+{
+  if (session->started || session->ran) {
+    return hapi_session_fail(session, HAP_ERROR_STATE, "the session has been started already");
+  }
+  HAPI_TRY(far_check(session));
+  if (ferry->side == HAPI_SIDE_BOTH && session->def.drive != HAP_DRIVE_LOCKSTEP) {
+    return hapi_session_fail(session, HAP_ERROR_UNSUPPORTED,
+                             "world and loop of one session are apart in drive LOCKSTEP alone");
+  }
+  hapi_exchange *exchange = session->ferry.exchange;
+  if (exchange == NULL && ferry->side == HAPI_SIDE_BOTH &&
+      hapi_exchange_create(hapi_exchange_capacity(session->exchange), &exchange) < HAP_OK) {
+    return hapi_session_fail(session, HAP_ERROR_MEMORY, "no memory for the messages of physics");
+  }
+  if (exchange != NULL) {
+    hapi_physics_set_exchange(session->physics, exchange);
+  }
+  session->ferry = *ferry;
+  session->ferry.exchange = exchange;
+  const hapi_physics_calls calls = {ferry->of, ferry->before_cycle, ferry->after_cycle};
+  hapi_physics_set_calls(session->physics, &calls);
+  return HAP_OK;
+}
+
+/* ---- the ends ---- */
+
+/* A cycle is for its deadline, and comes a little later: messages are told when they were looked
+ * for. */
+static int64_t far_now(const hapi_far *far, int64_t now_ns)
+{
+  return far->lockstep ? now_ns : hapi_clock_now();
+}
+
+static void far_before_cycle(void *of, int64_t now_ns)
+{
+  hapi_far *far = of;
+  pthread_mutex_lock(&far->lock);
+  hapi_world_end_receive(&far->world, far_now(far, now_ns));
+  pthread_mutex_unlock(&far->lock);
+}
+
+static void far_after_cycle(void *of, int64_t now_ns)
+{
+  hapi_far *far = of;
+  pthread_mutex_lock(&far->lock);
+  hapi_world_end_send(&far->world, far_now(far, now_ns));
+  pthread_mutex_unlock(&far->lock);
+}
+
+static void far_before_tick(void *of, int64_t now_ns)
+{
+  hapi_far *far = of;
+  pthread_mutex_lock(&far->lock);
+  hapi_loop_end_receive(&far->loop, now_ns);
+  pthread_mutex_unlock(&far->lock);
+}
+
+static void far_after_tick(void *of, int64_t now_ns)
+{
+  hapi_far *far = of;
+  pthread_mutex_lock(&far->lock);
+  hapi_loop_end_send(&far->loop, now_ns);
+  pthread_mutex_unlock(&far->lock);
+}
+
+/* ---- the thread of a loop's end: looks for messages between ticks, whoever makes them ---- */
+
+#define LOOK_NS 1000000LL
+
+static void *network_main(void *arg)
+{
+  hapi_far *far = arg;
+  int64_t next_ns = hapi_clock_now();
+  while (atomic_load(&far->stop) == 0) {
+    far_before_tick(far, hapi_clock_now());
+    far_after_tick(far, hapi_clock_now());
+    next_ns += LOOK_NS;
+    int64_t now_ns = hapi_clock_now();
+    next_ns = next_ns > now_ns ? next_ns : now_ns;
+    hapi_clock_sleep_until(next_ns);
+  }
+  return NULL;
+}
+
+static hap_status network_start(hap_session *session)
+{
+  hapi_far *far = session->ferry.far;
+  atomic_store(&far->stop, 0);
+  return hapi_thread_start(&far->thread, network_main, far, "hapode-network",
+                           session->def.rt_priority / 2);
+}
+
+static void network_stop(hap_session *session)
+{
+  atomic_store(&session->ferry.far->stop, 1);
+  hapi_thread_join(&session->ferry.far->thread);
+}
+
+static void far_renew(void *of)
+{
+  hapi_physics_renew_loop(of);
+}
+
+static hap_status far_fill(const hap_session *session, hapi_far *far)
+{
+  const hap_session_def *def = &session->def;
+  hapi_exchange *apart = session->ferry.exchange;
+  const hapi_terms terms = {.look_ahead_s = def->expert->look_ahead,
+                            .period_s = 1.0 / def->physics_hz,
+                            .haptic_hz = def->haptic_hz,
+                            .capacity = *hapi_exchange_capacity(session->exchange)};
+  far->world.terms = far->loop.terms = terms;
+  far->world.exchange = apart != NULL ? apart : session->exchange;
+  far->world.renew = far_renew;
+  far->world.renew_of = session->physics;
+  far->loop.exchange = session->exchange;
+  far->lockstep = def->drive == HAP_DRIVE_LOCKSTEP;
+  pthread_mutex_init(&far->lock, NULL);
+  HAPI_TRY(hapi_world_end_begin(&far->world));
+  return hapi_loop_end_begin(&far->loop);
+}
+
+hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far)
+{
+  hapi_ferry ferry = {.side = side, .of = far, .far = far};
+  if (side != HAPI_SIDE_LOOP) {
+    ferry.before_cycle = far_before_cycle;
+    ferry.after_cycle = far_after_cycle;
+  }
+  if (side != HAPI_SIDE_WORLD) {
+    ferry.before_tick = far_before_tick;
+    ferry.after_tick = far_after_tick;
+  }
+  if (side == HAPI_SIDE_LOOP) {
+    ferry.start = network_start;
+    ferry.stop = network_stop;
+  }
+  HAPI_TRY(hapi_session_set_ferry(session, &ferry));
+  hap_status status = far_fill(session, far);
+  return status >= HAP_OK
+             ? status
+             : hapi_session_fail(session, status, "no memory for the state of a far loop");
+}
+
+void hapi_far_finish(hapi_far *far)
+{
+  hapi_world_end_finish(&far->world);
+  hapi_loop_end_finish(&far->loop);
+  pthread_mutex_destroy(&far->lock);
+}

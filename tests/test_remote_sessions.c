@@ -1,0 +1,426 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* hapode/remote.h: sessions with a world and sessions with a hand, by the public API; in lockstep
+ * over the link inside the process, and in threads over datagrams of the loopback interface. */
+
+#include "tests/tap.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <hapode/hapode.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "tests/ode_world.h"
+
+#define MS 1000000LL
+
+/* ---- datagrams: a transport that knows the headers alone; on loopback all of them arrive ---- */
+
+#define CABLE_HEAD 5 /* what it is, channel, part, reliable; and JOIN and LEAVE for the other end */
+#define CABLE_MESSAGE 0
+#define CABLE_JOIN 1
+#define CABLE_LEAVE 2
+
+typedef struct cable {
+  int socket;
+  bool server;
+  bool joined;
+  bool told; /* that it joins */
+  unsigned char in[CABLE_HEAD + HAP_LINK_RELIABLE_MOST];
+} cable;
+
+static void cable_put(const cable *c, unsigned char what, const hap_link_parcel *parcel)
+{
+  unsigned char out[CABLE_HEAD + HAP_LINK_RELIABLE_MOST] = {what};
+  size_t size = CABLE_HEAD;
+  if (parcel != NULL) {
+    out[1] = (unsigned char)parcel->to.channel;
+    out[2] = (unsigned char)parcel->to.part;
+    out[3] = (unsigned char)parcel->reliable;
+    memcpy(out + CABLE_HEAD, parcel->data, parcel->bytes);
+    size += parcel->bytes;
+  }
+  (void)send(c->socket, out, size, 0);
+}
+
+static hap_status cable_send(void *self, int64_t now_ns, const hap_link_parcel *parcel,
+                             hap_detail *detail)
+{
+  cable *c = self;
+  (void)now_ns;
+  if (!c->joined) {
+    snprintf(detail->text, sizeof detail->text, "nobody is at the other end");
+    return HAP_ERROR_NOT_FOUND;
+  }
+  cable_put(c, CABLE_MESSAGE, parcel);
+  return HAP_OK;
+}
+
+static hap_status cable_poll(void *self, int64_t now_ns, hap_link_event *out, hap_detail *detail)
+{
+  cable *c = self;
+  (void)now_ns;
+  (void)detail;
+  if (!c->server && !c->told) {
+    cable_put(c, CABLE_JOIN, NULL);
+    c->told = true;
+  }
+  ssize_t size = 0;
+  do { /* what is left of another client goes */
+    size = recv(c->socket, c->in, sizeof c->in, MSG_DONTWAIT);
+    if (size < CABLE_HEAD) {
+      return HAP_END;
+    }
+  } while (c->in[0] == CABLE_MESSAGE && !c->joined);
+  out->peer = c->server ? 1 : HAP_LINK_SERVER;
+  if (c->in[0] == CABLE_JOIN) {
+    out->kind = HAP_LINK_JOINED;
+    out->data = "cable";
+    c->joined = true;
+    if (c->server) {
+      cable_put(c, CABLE_JOIN, NULL);
+    }
+    return HAP_OK;
+  }
+  if (c->in[0] == CABLE_LEAVE) {
+    out->kind = HAP_LINK_LEFT;
+    c->joined = false;
+    return HAP_OK;
+  }
+  out->channel = c->in[1];
+  out->part = c->in[2];
+  out->reliable = c->in[3];
+  out->bytes = (uint32_t)size - CABLE_HEAD;
+  out->data = c->in + CABLE_HEAD;
+  return HAP_OK;
+}
+
+static void cable_close(void *self)
+{
+  cable *c = self;
+  cable_put(c, CABLE_LEAVE, NULL);
+  close(c->socket);
+}
+
+static const hap_link_ops cable_ops = {.abi = HAP_LINK_ABI,
+                                       .size = sizeof(hap_link_ops),
+                                       .name = "cable",
+                                       .send = cable_send,
+                                       .poll = cable_poll,
+                                       .close = cable_close};
+
+/* Two sockets of the loopback interface that know each other. */
+static void cables_open(cable of[2])
+{
+  struct sockaddr_in at[2];
+  for (int i = 0; i < 2; ++i) {
+    socklen_t size = sizeof at[i];
+    of[i] = (cable){.socket = socket(AF_INET, SOCK_DGRAM, 0), .server = i == 0};
+    memset(&at[i], 0, sizeof at[i]);
+    at[i].sin_family = AF_INET;
+    at[i].sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    REQUIRE(of[i].socket >= 0);
+    REQUIRE(bind(of[i].socket, (struct sockaddr *)&at[i], sizeof at[i]) == 0);
+    REQUIRE(getsockname(of[i].socket, (struct sockaddr *)&at[i], &size) == 0);
+  }
+  for (int i = 0; i < 2; ++i) {
+    REQUIRE(connect(of[i].socket, (struct sockaddr *)&at[1 - i], sizeof at[1 - i]) == 0);
+  }
+}
+
+/* ---- a world and a hand ---- */
+
+typedef struct side {
+  dWorldID world;
+  dSpaceID space;
+  dBodyID cube;
+  hap_session_def def;
+  hap_expert_def expert;
+  hap_research_def research;
+  hap_session *session;
+  hap_pointer_id hand;
+  hap_link *link;
+} side;
+
+static void side_finish(void *owned)
+{
+  side *s = owned;
+  ode_world_end(s->session, s->world, s->space);
+  hap_link_close(s->link);
+}
+
+static side *side_new(hap_drive drive)
+{
+  side *s = tap_own(sizeof *s, side_finish);
+  session_defs_init(&s->def, &s->expert, &s->research);
+  s->def.drive = drive;
+  s->def.physics_hz = 50.0;
+  s->def.rt_priority = 0;
+  s->def.max_bodies = 8;
+  s->def.max_contacts = 64;
+  s->def.expert = &s->expert;
+  s->expert.look_ahead = 0.2;
+  return s;
+}
+
+static void side_create(side *s, bool filled)
+{
+  hap_ode_def ode;
+  ode_world_make(filled ? 9.81 : 0.0, &s->world, &s->space);
+  if (filled) {
+    ode_world_stiffen(s->world, 100);
+    dCreatePlane(s->space, 0.0, 0.0, 1.0, 0.0);
+    s->cube = ode_box(s->world, s->space, 0.2, AT(0.05, 0.05, 0.05), AT(0.0, 0.0, 0.025));
+  }
+  hap_ode_def_init(&ode, sizeof ode);
+  ode.world = s->world;
+  ode.space = s->space;
+  s->session = session_make(&s->def, &ode);
+}
+
+static void side_add_hand(side *s)
+{
+  hap_pointer_def hand;
+  hap_pointer_def_init(&hand, sizeof hand);
+  hand.radius = 0.01;
+  hand.stiffness = 1000.0;
+  REQUIRE(hap_pointer_add(s->session, &hand, &s->hand) == HAP_OK);
+}
+
+static void side_put(const side *s, double z)
+{
+  const hap_pose pose = {{0.0, 0.0, z}, {1.0, 0.0, 0.0, 0.0}};
+  CHECK(hap_pointer_set_target(s->session, s->hand, &pose, NULL) == HAP_OK);
+}
+
+static double side_feel(const side *s)
+{
+  hap_pointer_state state;
+  CHECK(hap_pointer_get(s->session, s->hand, &state, sizeof state) >= HAP_OK);
+  return state.wrench.force[2];
+}
+
+static hap_remote_state side_state(const side *s)
+{
+  hap_remote_state state;
+  hap_detail detail;
+  CHECK(hap_session_remote_state(s->session, &state, sizeof state, &detail) == HAP_OK);
+  if (state.refused + state.failed > 0) {
+    printf("# %s\n", detail.text);
+  }
+  return state;
+}
+
+static const char *side_detail(const side *s)
+{
+  static hap_detail detail;
+  CHECK(hap_session_detail(s->session, &detail) == HAP_OK);
+  return detail.text;
+}
+
+/* ---- lockstep ---- */
+
+TEST(a_hand_is_served_by_the_public_api_in_lockstep)
+{
+  side *world = side_new(HAP_DRIVE_LOCKSTEP);
+  side *hand = side_new(HAP_DRIVE_LOCKSTEP);
+  hap_link_path_def path;
+  hap_link_path_def_init(&path, sizeof path);
+  path.delay = 0.05;
+  path.loss = 0.05;
+  side_create(world, true);
+  side_create(hand, false);
+  side_add_hand(hand);
+  REQUIRE(hap_link_local_serve(&world->link, NULL) == HAP_OK);
+  REQUIRE(hap_link_local_connect(world->link, "", &path, &path, &hand->link, NULL) == HAP_OK);
+  REQUIRE(hap_session_serve(world->session, world->link) == HAP_OK);
+  REQUIRE(hap_session_connect(hand->session, hand->link) == HAP_OK);
+  CHECK(side_state(hand).joined == 0 && side_state(world).joins == 0);
+  session_run(world->session);
+  session_run(hand->session);
+  for (int i = 0; i < 2000; ++i) {
+    side_put(hand, i < 700 ? 0.2 : 0.057);
+    CHECK(hap_session_advance(hand->session, 1) == HAP_OK);
+    CHECK(hap_session_advance(world->session, 1) == HAP_OK);
+  }
+  CHECK_NEAR(side_feel(hand), 3.0, 0.02);
+  hap_remote_state state = side_state(hand);
+  CHECK(state.joined == 1 && state.joins == 1 && state.refused == 0 && state.failed == 0);
+  CHECK_NEAR(state.round_trip_s, 0.1, 2e-3);
+  CHECK_NEAR(state.clock_ahead_s, 0.0, 2e-3);
+  CHECK_NEAR(state.look_ahead, 0.2, 1e-12);
+  CHECK(state.figures.received > 80 && state.figures.sent > 80);
+  CHECK(side_state(world).joined == 1 && side_state(world).refused == 0);
+  tap_release(hand);
+  CHECK(hap_session_advance(world->session, 200) == HAP_OK);
+  CHECK(side_state(world).joined == 0 && side_state(world).joins == 1);
+}
+
+/* ---- threads ---- */
+
+static bool wait_for(const side *hand, double low, double high)
+{
+  for (int i = 0; i < 10000; ++i) {
+    double force = side_feel(hand);
+    if (force >= low && force <= high) {
+      return true;
+    }
+    usleep(1000);
+  }
+  printf("# the force is %g N\n", side_feel(hand));
+  return false;
+}
+
+TEST(in_threads_over_datagrams_a_hand_feels_joins_leaves_and_comes_again)
+{
+  static cable cables[2];
+  side *world = side_new(HAP_DRIVE_THREADS);
+  side_create(world, true);
+  cables_open(cables);
+  REQUIRE(hap_link_create(&cable_ops, &cables[0], &world->link, NULL) == HAP_OK);
+  REQUIRE(hap_session_serve(world->session, world->link) == HAP_OK);
+  REQUIRE(hap_session_start(world->session) >= HAP_OK);
+  for (int round = 0; round < 2; ++round) {
+    side *hand = side_new(HAP_DRIVE_THREADS);
+    side_create(hand, false);
+    side_add_hand(hand);
+    side_put(hand, 0.2);
+    cables[1].socket = round == 0 ? cables[1].socket : dup(cables[1].socket);
+    REQUIRE(hap_link_create(&cable_ops, &cables[1], &hand->link, NULL) == HAP_OK);
+    REQUIRE(hap_session_connect(hand->session, hand->link) == HAP_OK);
+    REQUIRE(hap_session_start(hand->session) >= HAP_OK);
+    for (int i = 0; i < 5000 && side_state(hand).joined == 0; ++i) {
+      usleep(1000);
+    }
+    CHECK(side_state(hand).joined == 1);
+    usleep(300000);
+    side_put(hand, 0.057);
+    CHECK(wait_for(hand, 2.95, 3.05));
+    CHECK(side_state(hand).refused == 0 && side_state(world).refused == 0);
+    CHECK(side_state(hand).round_trip_s < 1.0);
+    int keep = dup(cables[1].socket);
+    tap_release(hand); /* closes its socket */
+    cables[1] = (cable){.socket = keep};
+    for (int i = 0; i < 5000 && side_state(world).joined == 1; ++i) {
+      usleep(1000);
+    }
+    CHECK(side_state(world).joined == 0 && side_state(world).joins == (uint64_t)round + 1);
+  }
+  close(cables[1].socket);
+}
+
+/* The server's process ends without a word: its messages stop. */
+TEST(in_threads_a_world_that_falls_silent_is_felt_as_nothing)
+{
+  static cable cables[2];
+  side *world = side_new(HAP_DRIVE_THREADS);
+  side *hand = side_new(HAP_DRIVE_THREADS);
+  side_create(world, true);
+  side_create(hand, false);
+  side_add_hand(hand);
+  side_put(hand, 0.2);
+  cables_open(cables);
+  REQUIRE(hap_link_create(&cable_ops, &cables[0], &world->link, NULL) == HAP_OK);
+  REQUIRE(hap_link_create(&cable_ops, &cables[1], &hand->link, NULL) == HAP_OK);
+  REQUIRE(hap_session_serve(world->session, world->link) == HAP_OK);
+  REQUIRE(hap_session_connect(hand->session, hand->link) == HAP_OK);
+  REQUIRE(hap_session_start(world->session) >= HAP_OK);
+  REQUIRE(hap_session_start(hand->session) >= HAP_OK);
+  for (int i = 0; i < 5000 && side_state(hand).joined == 0; ++i) {
+    usleep(1000);
+  }
+  usleep(300000);
+  side_put(hand, 0.057);
+  CHECK(wait_for(hand, 2.95, 3.05));
+  REQUIRE(hap_session_lock(world->session) == HAP_OK); /* physics stands still */
+  CHECK(wait_for(hand, -1e-9, 1e-9));
+  REQUIRE(hap_session_unlock(world->session) == HAP_OK);
+  CHECK(wait_for(hand, 2.95, 3.05)); /* and comes back */
+  hap_stats stats;
+  CHECK(hap_session_stats(hand->session, &stats, sizeof stats) == HAP_OK);
+  CHECK(stats.faults.stale_times >= 1 && stats.faults.count == 0);
+}
+
+/* Frames of 16 ms for two seconds: the hand comes down in the middle. */
+TEST(a_world_in_a_frame_loop_is_felt_in_another_session)
+{
+  static cable cables[2];
+  side *world = side_new(HAP_DRIVE_FRAME);
+  side *hand = side_new(HAP_DRIVE_THREADS);
+  side_create(world, true);
+  side_create(hand, false);
+  side_add_hand(hand);
+  side_put(hand, 0.2);
+  cables_open(cables);
+  REQUIRE(hap_link_create(&cable_ops, &cables[0], &world->link, NULL) == HAP_OK);
+  REQUIRE(hap_link_create(&cable_ops, &cables[1], &hand->link, NULL) == HAP_OK);
+  REQUIRE(hap_session_serve(world->session, world->link) == HAP_OK);
+  REQUIRE(hap_session_connect(hand->session, hand->link) == HAP_OK);
+  REQUIRE(hap_session_start(world->session) >= HAP_OK);
+  REQUIRE(hap_session_start(hand->session) >= HAP_OK);
+  bool felt = false;
+  for (int frame = 0; frame < 600 && !felt; ++frame) {
+    CHECK(hap_session_update(world->session, 0.016) >= HAP_OK);
+    if (frame == 60) {
+      side_put(hand, 0.057);
+    }
+    felt = fabs(side_feel(hand) - 3.0) < 0.05;
+    usleep(16000);
+  }
+  CHECK(felt);
+}
+
+/* ---- what does not go ---- */
+
+TEST(what_does_not_go_over_a_network_is_refused_with_a_text)
+{
+  hap_link *link;
+  REQUIRE(hap_link_local_serve(&link, NULL) == HAP_OK);
+  side *s = side_new(HAP_DRIVE_LOCKSTEP);
+  s->def.model = HAP_MODEL_ACCELERANCE;
+  side_create(s, true);
+  CHECK(hap_session_serve(s->session, link) == HAP_ERROR_UNSUPPORTED);
+  CHECK(strstr(side_detail(s), "model") != NULL);
+  s = side_new(HAP_DRIVE_LOCKSTEP);
+  s->expert.lookback = 0.1;
+  side_create(s, true);
+  CHECK(hap_session_serve(s->session, link) == HAP_ERROR_UNSUPPORTED);
+  CHECK(strstr(side_detail(s), "looking back") != NULL);
+  s = side_new(HAP_DRIVE_FRAME);
+  side_create(s, true);
+  CHECK(hap_session_connect(s->session, link) == HAP_ERROR_UNSUPPORTED);
+  CHECK(strstr(side_detail(s), "FRAME") != NULL);
+  s = side_new(HAP_DRIVE_LOCKSTEP);
+  side_create(s, true);
+  hap_remote_state state;
+  CHECK(hap_session_remote_state(s->session, &state, sizeof state, NULL) == HAP_ERROR_STATE);
+  CHECK(hap_session_serve(s->session, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_serve(NULL, link) == HAP_ERROR_ARGUMENT);
+  side_add_hand(s);
+  CHECK(hap_session_serve(s->session, link) == HAP_ERROR_STATE);
+  CHECK(strstr(side_detail(s), "pointer") != NULL);
+  CHECK(hap_session_connect(s->session, link) == HAP_OK);
+  CHECK(hap_session_connect(s->session, link) == HAP_ERROR_STATE);
+  CHECK(hap_session_remote_state(s->session, &state, 2, NULL) == HAP_ERROR_ARGUMENT);
+  CHECK(hap_session_remote_state(s->session, NULL, sizeof state, NULL) == HAP_ERROR_ARGUMENT);
+  s = side_new(HAP_DRIVE_LOCKSTEP);
+  side_create(s, true);
+  session_run(s->session);
+  CHECK(hap_session_serve(s->session, link) == HAP_ERROR_STATE);
+  s = side_new(HAP_DRIVE_LOCKSTEP);
+  side_create(s, true);
+  hap_pointer_def hand;
+  hap_pointer_def_init(&hand, sizeof hand);
+  CHECK(hap_session_serve(s->session, link) == HAP_OK);
+  CHECK(hap_pointer_add(s->session, &hand, &s->hand) == HAP_ERROR_STATE);
+  CHECK(strstr(side_detail(s), "hap_session_connect") != NULL);
+  session_run(s->session);
+  CHECK(hap_session_stop(s->session) == HAP_OK);
+  CHECK(hap_session_start(s->session) == HAP_ERROR_STATE);
+  CHECK(strstr(side_detail(s), "anew") != NULL);
+  tap_release(s);
+  hap_link_close(link);
+}
