@@ -440,7 +440,7 @@ static void wire_state_lists(const wire_world *w, wire_dice *d, hapi_state *s)
   s->joint_count = dice_below(d, 20);
   for (uint32_t i = 0; i < s->joint_count; ++i) {
     hapi_state_joint *joint = &hapi_state_joints(s)[i];
-    *joint = (hapi_state_joint){.slot = i, .generation = 7, .body_a = i + 1};
+    *joint = (hapi_state_joint){.slot = i, .generation = 7, .body_a = i % 9};
     dice_fill(d, &joint->given.seconds, 13);
   }
   s->side_count = dice_below(d, 10);
