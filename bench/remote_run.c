@@ -20,28 +20,31 @@ const accuracy_scene *remote_scene(const char *name)
   return which;
 }
 
-/* The scene with a hand that waits; what def says of the session stays. */
+/* The scene with a hand that waits; what def says of the session stays, and it is told how long the
+ * run is. */
 static hap_status scene_run(bench *b, const accuracy_scene *which, double seconds,
                             accuracy_run_def *def, accuracy_motion *out)
 {
   char hands[SCENE_POINTERS_MAX][ACCURACY_SPEC_MAX];
+  accuracy_run_def run = *def;
   scene_parameters parameters = accuracy_parameters(which);
   parameters.shift[0] = SHIFT_X;
   parameters.shift[1] = SHIFT_Y;
-  def->parameters = &parameters;
-  def->seconds = REMOTE_LATE_S + (seconds > 0.0 ? seconds : accuracy_seconds(which, true));
+  run.parameters = &parameters;
+  def->seconds = run.seconds =
+      REMOTE_LATE_S + (seconds > 0.0 ? seconds : accuracy_seconds(which, true));
   for (int i = 0; i < parameters.pointers; ++i) {
     if (!accuracy_hand(parameters.hands[i], 1.0, hands[i], sizeof hands[i] - 32)) {
       return bench_fail(b, HAP_ERROR_FORMAT, "%s: the hand is not understood", which->name);
     }
     size_t length = strlen(hands[i]);
     (void)snprintf(hands[i] + length, sizeof hands[i] - length, ",start=%g", -REMOTE_LATE_S);
-    def->hands[i] = hands[i];
+    run.hands[i] = hands[i];
   }
-  def->session.physics_hz = REMOTE_PHYSICS_HZ;
-  def->session.max_bodies = BODIES_MOST;
-  def->session.max_contacts = CONTACTS_MOST;
-  return accuracy_run(b, def, out);
+  run.session.physics_hz = REMOTE_PHYSICS_HZ;
+  run.session.max_bodies = BODIES_MOST;
+  run.session.max_contacts = CONTACTS_MOST;
+  return accuracy_run(b, &run, out);
 }
 
 hap_status remote_reference(bench *b, const accuracy_scene *which, double seconds,
