@@ -101,6 +101,7 @@ static const far_case cases[] = {
     {"hit", "hit", 0.05, 0.3},
     {"door", "door", 0.1, 0.5},
     {"slide", "slide", 0.2, 0.3},
+    {"hit, nearly half a second away", "hit", 0.475, 0.3},
 };
 
 TEST_EACH(cases, const far_case *row)
@@ -207,5 +208,46 @@ TEST(a_delay_that_was_not_agreed_on_is_an_outage)
   cw_run(w, 1400);
   CHECK_NEAR(w->force[2], 0.0, 1e-9);
   CHECK(cw_stats(w).faults.stale_ticks > 1000);
+  held_end(&far_held);
+}
+
+/* ---- a body that comes and goes ---- */
+
+#define FLY_S 6.0
+#define FLY_SPEED 4.0 /* m/s */
+#define FLY_FROM 8.0  /* m before the hand */
+#define FLY_AHEAD 0.25
+
+/* Without gravity, past the hand. The loop takes what may arrive within half a second and what the
+ * session looks ahead, at 15 m/s^2 beside its speed. Where the world gets it back it is on its line,
+ * as if nobody had taken it: the message of it was 0.1 s on its way. */
+TEST(a_body_that_the_loop_had_goes_on_where_it_would_be)
+{
+  contact_world *w = cw_new(0.0);
+  dBodyID body = cw_add_cube(w, 0.3, 0.05, -FLY_FROM, 0.1, 0.0);
+  double taken = 0.0; /* m before the hand */
+  dBodySetLinearVel(body, FLY_SPEED, 0.0, 0.0);
+  w->def.max_bodies = 8;
+  w->def.max_contacts = 64;
+  w->expert.look_ahead = FLY_AHEAD;
+  cw_make(w, 0.0, 0.0, 0.0);
+  REQUIRE(held_begin(&far_held, w->session, 0.1) >= HAP_OK);
+  far_held.silent_from_ns = 0;
+  session_run(w->session);
+  for (int i = 0; i < FLY_S * 1000; ++i) {
+    cw_tick(w);
+    if (taken == 0.0 && cw_stats(w).model.range_bodies > 0) {
+      taken = -dBodyGetPosition(body)[0];
+    }
+  }
+  double ahead_s = 0.5 + FLY_AHEAD;
+  double reach = FLY_SPEED * ahead_s + 0.5 * 15.0 * ahead_s * ahead_s;
+  double step = FLY_SPEED / w->def.physics_hz;
+  CHECK_SAY(taken > reach - step && taken < reach + step, "%g m, %g m", taken, reach);
+  CHECK(cw_stats(w).model.range_bodies == 0);
+  double steps = (double)cw_stats(w).physics.steps;
+  double way = dBodyGetPosition(body)[0] + FLY_FROM;
+  printf("# %.4f m in %g steps of %g Hz\n", way, steps, w->def.physics_hz);
+  CHECK_NEAR(way, FLY_SPEED * steps / w->def.physics_hz, 1e-3);
   held_end(&far_held);
 }
