@@ -10,6 +10,7 @@
 #include "tests/contact_world.h"
 #include "tests/held_messages.h"
 #include "tests/logged.h"
+#include "tests/solids.h"
 
 #define LATE_S 1.0    /* the hand begins to move so long after the start */
 #define MARGIN_S 0.05 /* of looking ahead, beyond the round trip */
@@ -250,4 +251,72 @@ TEST(a_body_that_the_loop_had_goes_on_where_it_would_be)
   printf("# %.4f m in %g steps of %g Hz\n", way, steps, w->def.physics_hz);
   CHECK_NEAR(way, FLY_SPEED * steps / w->def.physics_hz, 1e-3);
   held_end(&far_held);
+}
+
+/* ---- what a hand falls on ---- */
+
+#define DROP_MS 1500
+#define DROP_BEGINS_MS 800
+#define DROP_MS_OF_WAY 497 /* 2 m/s from 1 m, 6 mm above or in the floor */
+
+typedef struct drop_case {
+  const char *name;
+  bool hull;
+  bool mesh;
+} drop_case;
+
+static const drop_case drops[] = {
+    {"a_ball_falls_on_triangles", false, true},
+    {"a_tool_falls_on_triangles", true, true},
+    {"a_tool_falls_on_a_box", true, false},
+};
+
+static void drop_run(const drop_case *row, double delay_s, double look_ahead_s, double out[DROP_MS])
+{
+  static const double half[3] = {0.01, 0.01, 0.01};
+  static const double middle[3] = {0.0, 0.0, 0.0};
+  double corners[24];
+  contact_world *w = cw_new(0.0);
+  if (row->mesh) {
+    (void)mesh_floor(w->space);
+  } else {
+    dGeomSetPosition(dCreateBox(w->space, 2.0, 2.0, 0.2), 0.0, 0.0, -0.1);
+  }
+  box_corners(half, middle, corners);
+  w->hand_def.radius = row->hull ? 0.0 : 0.01;
+  w->hand_def.hull_xyz = row->hull ? corners : NULL;
+  w->hand_def.hull_points = row->hull ? 8 : 0;
+  w->expert.look_ahead = look_ahead_s;
+  cw_make(w, 0.0, 0.0, 1.0);
+  REQUIRE(held_begin(&far_held, w->session, delay_s) >= HAP_OK);
+  far_held.silent_from_ns = 0;
+  session_run(w->session);
+  for (int i = 0; i < DROP_MS; ++i) {
+    bool falls = i >= DROP_BEGINS_MS && i < DROP_BEGINS_MS + DROP_MS_OF_WAY;
+    cw_move_hand(w, 0.0, 0.0, falls ? -2.0 : 0.0);
+    cw_tick(w);
+    out[i] = w->force[2];
+  }
+  held_end(&far_held);
+}
+
+static double drop_differs(const double a[DROP_MS], const double b[DROP_MS])
+{
+  double most = 0.0;
+  for (int i = 0; i < DROP_MS; ++i) {
+    most = fmax(most, fabs(a[i] - b[i]));
+  }
+  return most;
+}
+
+TEST_EACH(drops, const drop_case *row)
+{
+  static double beside[DROP_MS];
+  static double late[DROP_MS];
+  drop_run(row, 0.0, 0.0, beside);
+  CHECK_NEAR(beside[DROP_MS - 1], 2000.0 * 0.004, 0.01);
+  drop_run(row, 0.2, 0.45, late);
+  CHECK_SAY(drop_differs(beside, late) < 1e-6, "%g N", drop_differs(beside, late));
+  drop_run(row, 0.2, 0.0, late);
+  CHECK_SAY(drop_differs(beside, late) > 1.0, "%g N", drop_differs(beside, late));
 }
