@@ -24,7 +24,8 @@ HAP_BEGIN_DECLS
  * session runs, and is closed after hap_session_destroy. Drives THREADS, FRAME and LOCKSTEP.
  *
  * When the hand's session leaves, its bodies are the world's again. Another one may join then. A
- * session that is served or connected is started once.
+ * session that is served or connected is started once. The impulses of a hand's session are not
+ * bounded here: serve only those that are trusted.
  *
  * HAP_ERROR_ARGUMENT: a NULL. HAP_ERROR_STATE: started already. HAP_ERROR_UNSUPPORTED: another
  * model than CONTACT, looking back, a contact callback, or a session that is recorded or played;
