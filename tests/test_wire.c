@@ -543,6 +543,56 @@ TEST_EACH(breaks, const broken *row)
   CHECK(!state_of(r, &came));
 }
 
+/* ---- lists that are copied from the base ---- */
+
+typedef struct copied_list {
+  const char *name;
+  uint8_t directory[4]; /* changed lists, records, code of a run, from */
+  bool good;
+} copied_list;
+
+static const copied_list copies[] = {
+    {"all_of_the_base", {8, 3, 2 * 3 + 1, 0}, true},
+    {"one_of_the_base", {8, 1, 2 * 1 + 1, 2}, true},
+    {"an_empty_run", {8, 1, 1, 0}, false},
+    {"a_run_longer_than_the_list", {8, 1, 2 * 2 + 1, 0}, false},
+    {"a_run_from_beyond_the_base", {8, 1, 2 * 1 + 1, 4}, false},
+    {"a_run_that_ends_beyond_the_base", {8, 2, 2 * 2 + 1, 2}, false},
+    {"a_run_of_an_empty_list", {16, 1, 2 * 1 + 1, 0}, false},
+};
+
+/* The base has three bodies. */
+TEST_EACH(copies, const copied_list *row)
+{
+  rig *r = rig_make();
+  const hapi_wire_out out = {&r->up, post_send};
+  hapi_state *state = hapi_exchange_state_back(r->out);
+  hapi_state *came;
+  state->time_scale = 1.0;
+  state->model = HAP_MODEL_CONTACT;
+  state->body_high = 3;
+  for (uint32_t i = 0; i < 3; ++i) {
+    hapi_state_bodies(state)[i] =
+        (hapi_state_body){.generation = 1 + i, .pose = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}}};
+  }
+  REQUIRE(hapi_wire_client_send(r->client, state, &out, &r->detail) == HAP_OK);
+  for (uint32_t i = 0; i < r->up.count; ++i) {
+    REQUIRE_SAY(take_up(r, &r->up.parcels[i]) == HAP_OK, "%s", r->detail.text);
+  }
+  REQUIRE(state_of(r, &came));
+  CHECK(came->body_high == 3);
+  const uint8_t *sent = r->up.parcels[r->up.count - 1].data;
+  const uint8_t *d = row->directory;
+  const uint8_t bytes[] = {sent[0], sent[1], 3, 0, sent[4] + 1, 1,    sent[6], sent[7],
+                           4,       4,       0, 0, d[0],        d[1], d[2],    d[3]};
+  CHECK(sent[2] == 3 && sent[4] < 127 && sent[6] < 128 && sent[7] < 128);
+  hap_status status =
+      hapi_wire_server_take(r->server, HAPI_WIRE_CHANNEL_STATE, bytes, sizeof bytes, &r->detail);
+  CHECK_SAY(status == (row->good ? HAP_OK : HAP_ERROR_FORMAT), "%s", r->detail.text);
+  CHECK(row->good || strstr(r->detail.text, "directory") != NULL);
+  CHECK(state_of(r, &came) == row->good);
+}
+
 TEST(every_shortened_datagram_is_refused)
 {
   for (uint32_t bytes = 0; bytes < sizeof golden; ++bytes) {
@@ -595,6 +645,16 @@ static void spoil_mass(hapi_model *m, hapi_near *n)
 {
   (void)n;
   hapi_model_bodies(m)[1].mass = 0.0;
+}
+static void spoil_held(hapi_model *m, hapi_near *n)
+{
+  (void)n;
+  hapi_model_bodies(m)[1].held_mass = -1.0;
+}
+static void spoil_generation(hapi_model *m, hapi_near *n)
+{
+  (void)n;
+  hapi_model_bodies(m)[1].generation = 0;
 }
 static void spoil_nan(hapi_model *m, hapi_near *n)
 {
@@ -679,6 +739,8 @@ static void spoil_texture(hapi_model *m, hapi_near *n)
 
 static const false_member lies[] = {
     {"mass", spoil_mass, HAP_OK, "mass"},
+    {"held_mass", spoil_held, HAP_OK, "mass"},
+    {"generation", spoil_generation, HAP_OK, "generation"},
     {"nan", spoil_nan, HAP_ERROR_ARGUMENT, "gravity"},
     {"far", spoil_far, HAP_ERROR_ARGUMENT, "position"},
     {"quat", spoil_quat, HAP_OK, "quat"},
