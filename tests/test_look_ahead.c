@@ -220,8 +220,8 @@ TEST(a_delay_that_was_not_agreed_on_is_an_outage)
 #define FLY_AHEAD 0.25
 
 /* Without gravity, past the hand. The loop takes what may arrive within half a second and what the
- * session looks ahead, at 15 m/s^2 beside its speed. Where the world gets it back it is on its line,
- * as if nobody had taken it: the message of it was 0.1 s on its way. */
+ * session looks ahead, at 15 m/s^2 beside its speed. Where the world gets the body back, that is on
+ * its line, as if nobody had taken it: the message of it was 0.1 s on its way. */
 TEST(a_body_that_the_loop_had_goes_on_where_it_would_be)
 {
   contact_world *w = cw_new(0.0);
