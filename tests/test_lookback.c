@@ -16,7 +16,7 @@
 #include "tests/solids.h"
 
 #define TICKS 1500
-#define SPEED 0.1 /* m/s, of the hand */
+#define SPEED 0.1003 /* m/s, of the hand: no cube is reached just at a tick */
 #define EDGE 0.1  /* m */
 #define RADIUS 0.01
 #define A_TICK \

@@ -36,7 +36,8 @@ struct hapi_pairs {
   uint32_t capacity; /* contacts */
   _Atomic uint64_t *left_out;
   hapi_kept kept;
-  pass_pair *pass; /* as the pairs that are kept */
+  uint64_t numbers; /* of contacts, that were given */
+  pass_pair *pass;  /* as the pairs that are kept */
   pair_group *group;
 };
 
@@ -292,6 +293,7 @@ static void key_find(hapi_pairs *pairs, const hapi_pass_body *const bodies[2], h
   io->gap = group->gap;
   io->clear = group->clear;
   for (uint32_t i = 0; i < group->count; ++i) {
+    group->contacts[i].number = ++pairs->numbers;
     hapi_kept_add(&pairs->kept, io, &group->contacts[i], &group->ends[i]);
   }
 }

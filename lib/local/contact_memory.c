@@ -56,6 +56,30 @@ static uint32_t first_of(const hapi_body_contacts *contacts, uint64_t key, uint3
   return count;
 }
 
+/* A contact at the place where it was in the message before keeps its rows as well, if its surface
+ * is the same. False: it is another one. */
+static bool memory_goes_on(const hapi_body_contacts *contacts, hapi_patches *before, uint32_t index,
+                           hapi_contact_memory *memory)
+{
+  hapi_patches *now = contacts->patches;
+  const hapi_patch_contact *in = &hapi_patches_contacts(now)[index];
+  hapi_contact_memory *old = &contacts->old_memory[index];
+  if (before == NULL || index >= before->contact_count || old->number != in->number ||
+      in->number == 0) {
+    return false;
+  }
+  const hapi_surface *was =
+      &hapi_patches_surfaces(before)[hapi_patches_contacts(before)[index].surface];
+  const hapi_surface *is = &hapi_patches_surfaces(now)[in->surface];
+  *memory = *old;
+  memory->kept.surface = in->surface;
+  if (memcmp(was, is, sizeof *is) != 0) {
+    memory->kept.what = HAPI_KEPT_NOTHING;
+  }
+  hapi_v3_set(old->core_a, HUGE_VAL, HUGE_VAL, HUGE_VAL);
+  return true;
+}
+
 /* An old contact gives its impulse to one new one only. */
 static void memory_match(hapi_body_contacts *contacts, hapi_contact_memory *memory, uint32_t count)
 {
@@ -79,18 +103,27 @@ static void memory_match(hapi_body_contacts *contacts, hapi_contact_memory *memo
 
 void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches)
 {
-  uint32_t old_count = contacts->patches != NULL ? contacts->memory_count : 0;
+  hapi_patches *before = contacts->patches;
+  uint32_t old_count = before != NULL ? contacts->memory_count : 0;
   hapi_contact_memory *old = contacts->memory;
+  bool indexed = false;
   contacts->memory = contacts->old_memory;
   contacts->old_memory = old;
   contacts->patches = patches;
   contacts->memory_count = patches->contact_count;
-  index_old(contacts, old_count);
   const hapi_patch_contact *in = hapi_patches_contacts(patches);
   for (uint32_t i = 0; i < patches->contact_count; ++i) {
     hapi_contact_memory *memory = &contacts->memory[i];
+    if (memory_goes_on(contacts, before, i, memory)) {
+      continue;
+    }
+    if (!indexed) {
+      index_old(contacts, old_count);
+      indexed = true;
+    }
     memset(memory, 0, sizeof *memory);
     memory->key = in[i].key;
+    memory->number = in[i].number;
     hapi_v3_copy(in[i].core_a, memory->core_a);
     memory_match(contacts, memory, old_count);
   }

@@ -35,6 +35,7 @@ typedef struct hapi_contact_kept {
 /* What is kept of a contact from tick to tick, and from one set of patches to the next. */
 typedef struct hapi_contact_memory {
   uint64_t key;
+  uint64_t number; /* see hapi_patch_contact */
   double core_a[3];
   double impulse[3]; /* N s: normal, friction 1 and 2 */
   hapi_contact_kept kept;

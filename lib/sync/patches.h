@@ -38,7 +38,8 @@ enum {
 /* A point of hapi_patch in the frames of its two bodies; the loop places it anew where they move.
  * Static world: world frame. */
 typedef struct hapi_patch_contact {
-  uint64_t key; /* of the pair; contacts of a pair follow each other */
+  uint64_t key;    /* of the pair; contacts of a pair follow each other */
+  uint64_t number; /* in two messages the same contact has the same one, but for its surface */
   uint32_t body_a;
   uint32_t generation_a;
   uint32_t body_b; /* HAPI_SLOT_NONE: static world */
