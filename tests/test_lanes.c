@@ -21,7 +21,7 @@
 
 void plain_hapi_solver_run(hapi_solver *solver);
 void plain_hapi_solver_calm(hapi_solver *solver);
-void plain_hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
+void plain_hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, bool by_mass);
 
 typedef struct problem {
   hapi_row rows[ROWS];
@@ -153,8 +153,8 @@ TEST(contacts_one_by_one)
     problem_make(seed, 1000, 0);
     for (uint32_t i = 0; i < ROWS; i += i < 3 * CONTACTS ? 3 : 1) {
       uint32_t count = i < 3 * CONTACTS ? 3 : 1;
-      hapi_contact_ready(&wide.solver, i, count);
-      plain_hapi_contact_ready(&plain.solver, i, count);
+      hapi_contact_ready(&wide.solver, i, count, false);
+      plain_hapi_contact_ready(&plain.solver, i, count, false);
     }
     wide.solver.ready = plain.solver.ready = true;
     hapi_solver_run(&wide.solver);
@@ -174,7 +174,7 @@ TEST(contact_as_rows)
       hapi_row_ready(&plain.solver, i);
     }
     for (uint32_t i = 0; i < 3 * CONTACTS; i += 3) {
-      hapi_contact_ready(&wide.solver, i, 3);
+      hapi_contact_ready(&wide.solver, i, 3, false);
     }
     for (uint32_t i = 0; i < 3 * CONTACTS; ++i) {
       CHECK_NEAR(wide.rows[i].impulse, plain.rows[i].impulse, 0.0);

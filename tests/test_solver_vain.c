@@ -40,13 +40,13 @@ static figures push_row(int count, double accuracy)
   const hapi_solver *solver = &w->session->haptic->tick.rows.solver;
   uint64_t before = 0;
   for (int i = 0; i < SETTLES + TICKS; ++i) {
-    uint32_t rest = solver->dear_runs;
+    uint32_t rest = solver->rest.runs;
     cw_tick(w);
     double updates = (double)(cw_stats(w).contact.sweeps - before) * solver->row_count;
     before = cw_stats(w).contact.sweeps;
     if (i >= SETTLES) {
-      out.rests += solver->dear_rows > 0;
-      out.tried += solver->dear_rows > 0 && solver->dear_runs > rest;
+      out.rests += solver->rest.rows > 0;
+      out.tried += solver->rest.rows > 0 && solver->rest.runs > rest;
       out.solved += solver->direct_solves > 0;
       out.most = updates > out.most ? updates : out.most;
       out.force -= w->force[0] / TICKS;

@@ -31,6 +31,9 @@ bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
   rows->solver.update_budget = SOLVER_UPDATES;
   rows->solver.direct_rows = DIRECT_ROWS;
   rows->solver.work_count = HAPI_SOLVER_WORK(rows->capacity, c->bodies + c->pointers + 1);
+  rows->solver.packs.work = hapi_pack_work_best();
+  rows->solver.packs.contact_capacity = (c->contacts + 1) / 2; /* two lanes of four, in the mean */
+  rows->solver.packs.body_capacity = c->bodies + c->pointers + 1;
   HAPI_ASSERT(rows->capacity > 0 && rows->solver.work_count > 0);
   hapi_tick_arrays(tick, arrays);
   for (int i = 0; i < HAPI_TICK_ARRAYS; ++i) {

@@ -231,6 +231,11 @@ static uint32_t list_parts(const placed_contact *c, const hapi_contact_memory *m
   return count;
 }
 
+static bool answers_by_mass(const hapi_local_body *body)
+{
+  return body == NULL || (body->flags & HAPI_BODY_MEASURED) == 0;
+}
+
 static void add_contact(hapi_rows *rows, placed_contact *c, const hapi_contact_memory *memory,
                         const hapi_tick_facts *facts, hapi_effect_sample *sample)
 {
@@ -256,7 +261,7 @@ static void add_contact(hapi_rows *rows, placed_contact *c, const hapi_contact_m
     set_friction(facts->period, c->surface, &own[i], parts[i], (int32_t)first);
   }
   solver->row_count += count;
-  hapi_contact_ready(solver, first, count);
+  hapi_contact_ready(solver, first, count, answers_by_mass(c->a) && answers_by_mass(c->b));
 }
 
 /* A body that the contact was made for, and that is where the contact thread thought it was. */

@@ -25,8 +25,9 @@
 
 /* A direct solve is made where so many sweeps will not do. It costs 15 to 20; with more than 13 a
  * stack of 30 cubes under a hand gains energy. */
-#define DIRECT_SWEEPS 10
-#define RATE_MOST 0.99 /* of sweeps that lead nowhere */
+#define DIRECT_SWEEPS 10u
+#define PACKED_SWEEPS 12u /* where contacts are in packs, not before so many */
+#define RATE_MOST 0.99    /* of sweeps that lead nowhere */
 
 /* ---- preparation ---- */
 
@@ -66,7 +67,6 @@ static void row_prepare(hapi_solver *solver, uint32_t index)
   }
   row->inverse = 1.0 / d;
   row->response = d;
-  row->moves_a = of_a != 0.0;
   row->paired = of_b != 0.0;
   bool moved = !row->paired && !row->single; /* by a partner that does not respond */
   row->drive = row->target - (moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0);
@@ -86,9 +86,11 @@ static void join_triple(hapi_solver *solver, uint32_t last)
     return;
   }
   hapi_row *r = &solver->rows[normal];
-  r->triple = r[0].inverse != 0.0 && r[0].normal < 0 && r[1].normal == normal && r[1].ball == 0 &&
-              r[1].inverse != 0.0 && r[2].inverse != 0.0;
-  if (r->triple) {
+  bool joins = r[0].inverse != 0.0 && r[0].normal < 0 && r[1].normal == normal && r[1].ball == 0 &&
+               r[1].inverse != 0.0 && r[2].inverse != 0.0;
+  if (joins) {
+    r->triple = HAPI_TRIPLE_ANY;
+    r->made = ++solver->packs.made;
     r[1].coupling[0] = rows_couple(&r[1], &r[0]);
     r[2].coupling[0] = rows_couple(&r[2], &r[0]);
     r[2].coupling[1] = rows_couple(&r[2], &r[1]);
@@ -131,7 +133,6 @@ void hapi_single_ready(hapi_solver *solver, uint32_t index, double response)
   }
   row->inverse = 1.0 / d;
   row->response = d;
-  row->moves_a = response != 0.0;
   row->drive = row->target;
   row->impulse = hapi_clamp(row->impulse, row->lo, row->hi);
   if (row->impulse != 0.0) {
@@ -139,7 +140,7 @@ void hapi_single_ready(hapi_solver *solver, uint32_t index, double response)
   }
 }
 
-void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
+void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, bool by_mass)
 {
   hapi_row *r = &solver->rows[first];
   bool may_join = count == 3 && r[1].normal == (int32_t)first && r[2].normal == (int32_t)first;
@@ -148,6 +149,9 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
   }
   if (may_join) {
     join_triple(solver, first + 2);
+    bool packable = by_mass && hapi_row_moves_a(r) && r[0].lo == 0.0 && r[0].hi == HUGE_VAL &&
+                    r[1].mu + r[2].mu < HUGE_VAL;
+    r->triple = r->triple && packable ? HAPI_TRIPLE_BY_MASS : r->triple;
   }
   for (uint32_t i = 0; i < count; ++i) {
     if (r[i].inverse != 0.0) {
@@ -158,13 +162,18 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count)
 
 /* ---- sweeps ---- */
 
-/* Of the rows that a sweep has updated so far. */
-typedef struct corrections {
-  double largest; /* m/s */
-  double energy2; /* J, sum of impulse^2 x response */
-} corrections;
+/* The rows that are in no pack. */
+static uint32_t loose_count(const hapi_solver *solver)
+{
+  return solver->packs.in_use ? solver->packs.loose_count : 1;
+}
 
-static inline void correction_note(const hapi_row *row, double change, corrections *io)
+static hapi_loose_rows loose_at(const hapi_solver *solver, uint32_t i)
+{
+  return solver->packs.in_use ? solver->packs.loose[i] : (hapi_loose_rows){0, solver->row_count};
+}
+
+static inline void correction_note(const hapi_row *row, double change, hapi_corrections *io)
 {
   double correction = change * row->response;
   double size = fabs(correction);
@@ -174,7 +183,7 @@ static inline void correction_note(const hapi_row *row, double change, correctio
 
 /* The rows of a body wait for each other, so that the way from v to v counts: the change is cut by
  * itself and not taken as the difference of two impulses. */
-static void row_update(hapi_solver *solver, hapi_row *row, corrections *io)
+static void row_update(hapi_solver *solver, hapi_row *row, hapi_corrections *io)
 {
   if (row->inverse == 0.0) {
     return;
@@ -217,7 +226,7 @@ static void push_triple(double v[6], const double d[3], const double b0[6], cons
 
 /* As three updates, but the velocities are read and written once: what the first changes do to the
  * later rows comes from the couplings. So the three do not wait for each other's way through v. */
-static void update_triple(hapi_solver *solver, hapi_row *r, corrections *io)
+static void update_triple(hapi_solver *solver, hapi_row *r, hapi_corrections *io)
 {
   double e[3];
   double d[3];
@@ -347,9 +356,9 @@ double hapi_ball_update(hapi_solver *solver, hapi_row *first)
   return largest;
 }
 
-static void update_ball(hapi_solver *solver, hapi_row *first, corrections *io)
+static void update_ball(hapi_solver *solver, hapi_row *first, hapi_corrections *io)
 {
-  double old[3];
+  double old[3] = {0.0};
   for (int i = 0; i < first->ball; ++i) {
     old[i] = first[i].impulse;
   }
@@ -360,9 +369,9 @@ static void update_ball(hapi_solver *solver, hapi_row *first, corrections *io)
   }
 }
 
-static void update_group(hapi_solver *solver, uint32_t first, uint32_t end, corrections *io)
+static void update_group(hapi_solver *solver, uint32_t first, uint32_t end, hapi_corrections *io)
 {
-  corrections sum = *io;
+  hapi_corrections sum = *io;
   for (uint32_t i = first; i < end; ++i) {
     hapi_row *row = &solver->rows[i];
     if (row->triple) {
@@ -380,12 +389,11 @@ static void update_group(hapi_solver *solver, uint32_t first, uint32_t end, corr
 
 /* Backwards contact by contact, but with each normal before its frictions: they then end inside the
  * bounds that it sets. */
-static void sweep_back(hapi_solver *solver, corrections *io)
+static void sweep_back(hapi_solver *solver, uint32_t begin, uint32_t end, hapi_corrections *io)
 {
-  uint32_t end = solver->row_count;
-  while (end > 0) {
+  while (end > begin) {
     uint32_t first = end - 1;
-    while (first > 0 && solver->rows[first].normal >= 0) {
+    while (first > begin && solver->rows[first].normal >= 0) {
       --first;
     }
     update_group(solver, first, end, io);
@@ -393,17 +401,32 @@ static void sweep_back(hapi_solver *solver, corrections *io)
   }
 }
 
+/* Forward, the loose rows first; they begin with those of the hand. */
 static void rows_sweep(hapi_solver *solver)
 {
-  corrections sum = {0.0, 0.0};
-  ++solver->sweeps;
-  if (solver->sweeps % 2 == 1) {
-    update_group(solver, 0, solver->row_count, &sum);
-  } else {
-    sweep_back(solver, &sum);
+  hapi_corrections sum = {0.0, 0.0};
+  uint32_t runs = loose_count(solver);
+  bool forward = solver->sweeps++ % 2 == 0;
+  for (uint32_t i = 0; forward && i < runs; ++i) {
+    hapi_loose_rows at = loose_at(solver, i);
+    update_group(solver, at.first, at.end, &sum);
+  }
+  if (solver->packs.in_use) {
+    solver->packs.work->sweep(&solver->packs, solver->v, forward, &sum);
+  }
+  for (uint32_t i = runs; !forward && i > 0; --i) {
+    hapi_loose_rows at = loose_at(solver, i - 1);
+    sweep_back(solver, at.first, at.end, &sum);
   }
   solver->residual = sum.largest;
   solver->corrected = sum.energy2;
+}
+
+/* Of a sweep, in row updates: those of all lanes of a pack take as long as two. */
+static uint32_t sweep_cost(const hapi_solver *solver)
+{
+  return solver->packs.in_use ? solver->packs.loose_rows + 6 * solver->packs.contact_count
+                              : solver->row_count;
 }
 
 /* ---- sweeps that look ahead ---- */
@@ -421,11 +444,12 @@ static void rows_sweep(hapi_solver *solver)
  * Silcowitz-Hansen, Niebe and Erleben (The Visual Computer 26, 2010). Velocities are linear in the
  * impulses and go along. Every way ends with a sweep, so the impulses end within their bounds. */
 typedef struct sweep_way {
-  double *x;       /* by row: impulse at the begin of the sweep */
-  double *p;       /* by row */
-  double *d;       /* by row */
-  double (*vx)[6]; /* by body: the same of the velocities */
-  double (*vp)[6];
+  const hapi_pack_work *work;
+  size_t packed; /* impulses in packs: they come first, then those of the loose rows */
+  double *x;     /* impulses at the begin of the sweep */
+  double *p;
+  double *vx; /* of all bodies: the same of the velocities */
+  double *vp;
   double size2; /* J, of the last d; 0: none yet */
   bool begun;
 } sweep_way;
@@ -433,17 +457,19 @@ typedef struct sweep_way {
 /* The memory is that of direct solves: a way ends where one of them is made. */
 static bool way_place(const hapi_solver *solver, sweep_way *out)
 {
-  size_t rows = solver->row_count;
+  size_t packed = solver->packs.in_use ? (size_t)3 * HAPI_LANES * solver->packs.contact_count : 0;
+  size_t rows = packed + (solver->packs.in_use ? solver->packs.loose_rows : solver->row_count);
   size_t bodies = solver->body_count;
+  out->work = solver->packs.work != NULL ? solver->packs.work : &hapi_pack_work_pairs;
+  out->packed = packed;
   out->begun = false;
   out->x = solver->work;
-  if (solver->work_count < 3 * rows + 12 * bodies) {
+  if (solver->work_count < 2 * rows + 12 * bodies) {
     return false;
   }
   out->p = out->x + rows;
-  out->d = out->p + rows;
-  out->vx = (double(*)[6])(out->d + rows);
-  out->vp = out->vx + bodies;
+  out->vx = out->p + rows;
+  out->vp = out->vx + 6 * bodies;
   return true;
 }
 
@@ -453,46 +479,83 @@ static void updates_spend(hapi_solver *solver, uint64_t *io_left, uint64_t cost)
   *io_left -= cost < *io_left ? cost : *io_left;
 }
 
-/* In row updates. */
-static uint32_t way_cost(uint32_t rows)
-{
-  return rows / 4;
-}
-
 static void way_begin(const hapi_solver *solver, sweep_way *way)
 {
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    way->x[i] = solver->rows[i].impulse;
+  size_t at = way->packed;
+  size_t bodies = 6 * (size_t)solver->body_count;
+  if (at > 0) {
+    memcpy(way->x, solver->packs.impulse, at * sizeof *way->x);
   }
-  memcpy(way->vx, solver->v, solver->body_count * sizeof *solver->v);
+  for (uint32_t i = 0; i < loose_count(solver); ++i) {
+    hapi_loose_rows run = loose_at(solver, i);
+    for (uint32_t k = run.first; k < run.end; ++k) {
+      way->x[at++] = solver->rows[k].impulse;
+    }
+  }
+  memcpy(way->vx, solver->v, bodies * sizeof *way->vx);
+  memset(way->p, 0, at * sizeof *way->p);
+  memset(way->vp, 0, bodies * sizeof *way->vp);
   way->size2 = 0.0;
   way->begun = true;
+}
+
+/* J, of the change since the sweep's begin. */
+static double way_energy(const hapi_solver *solver, const sweep_way *way)
+{
+  size_t at = way->packed;
+  double size2 = 0.0;
+  if (at > 0) {
+    size2 = way->work->way_energy(&solver->packs.impulse[0][0][0], way->x,
+                                  &solver->packs.response[0][0][0], at);
+  }
+  for (uint32_t i = 0; i < loose_count(solver); ++i) {
+    hapi_loose_rows run = loose_at(solver, i);
+    for (uint32_t k = run.first; k < run.end; ++k) {
+      const hapi_row *row = &solver->rows[k];
+      double d = row->inverse != 0.0 ? row->impulse - way->x[at] : 0.0;
+      size2 += d * d * row->response;
+      ++at;
+    }
+  }
+  return size2;
+}
+
+/* As hapi_pack_work.way_go_on, of one number. */
+static void number_go_on(double *now, double *x, double *p, double share)
+{
+  double d = *now - *x;
+  double more = share * *p;
+  *x = *now += more;
+  *p = more + d;
 }
 
 /* From the end of one sweep to the begin of the next one. */
 static void way_go_on(hapi_solver *solver, sweep_way *way)
 {
-  double size2 = 0.0;
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    const hapi_row *row = &solver->rows[i];
-    double d = row->inverse != 0.0 ? row->impulse - way->x[i] : 0.0;
-    way->d[i] = d;
-    size2 += d * d * row->response;
-  }
+  double size2 = way_energy(solver, way);
   bool ahead = size2 <= way->size2 && way->size2 > 0.0 && way->size2 < HUGE_VAL;
   double share = ahead ? size2 / way->size2 : 0.0;
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    double more = ahead ? share * way->p[i] : 0.0;
-    way->x[i] = solver->rows[i].impulse += more;
-    way->p[i] = more + way->d[i];
+  size_t at = way->packed;
+  size_t bodies = 6 * (size_t)solver->body_count;
+  size_t whole = bodies / HAPI_LANES * HAPI_LANES;
+  double *v = solver->v[0];
+  if (!ahead && way->size2 > 0.0) { /* what is no number would stay so */
+    memset(way->p, 0, (size_t)(way->vx - way->p) * sizeof *way->p);
+    memset(way->vp, 0, bodies * sizeof *way->vp);
   }
-  for (uint32_t i = 0; i < solver->body_count; ++i) {
-    for (int k = 0; k < 6; ++k) {
-      double d = solver->v[i][k] - way->vx[i][k];
-      double more = ahead ? share * way->vp[i][k] : 0.0;
-      way->vx[i][k] = solver->v[i][k] += more;
-      way->vp[i][k] = more + d;
+  if (at > 0) {
+    way->work->way_go_on(&solver->packs.impulse[0][0][0], way->x, way->p, share, at);
+  }
+  for (uint32_t i = 0; i < loose_count(solver); ++i) {
+    hapi_loose_rows run = loose_at(solver, i);
+    for (uint32_t k = run.first; k < run.end; ++k) {
+      number_go_on(&solver->rows[k].impulse, &way->x[at], &way->p[at], share);
+      ++at;
     }
+  }
+  way->work->way_go_on(v, way->vx, way->vp, share, whole);
+  for (size_t i = whole; i < bodies; ++i) {
+    number_go_on(&v[i], &way->vx[i], &way->vp[i], share);
   }
   way->size2 = size2;
 }
@@ -514,13 +577,11 @@ static void check_finite(hapi_solver *solver)
   }
 }
 
-/* Too dear for the whole budget, not for what was left of it. */
-static void note_dear(hapi_solver *solver, uint64_t left, uint32_t rows)
+/* The first one of the run was too dear for what its sweeps have left. */
+static void note_dear(hapi_solver *solver, uint32_t rows)
 {
-  if (left + 3 * (uint64_t)rows >= solver->update_budget) {
-    solver->dear_rows = rows;
-    solver->dear_runs = DEAR_RUNS;
-  }
+  solver->rest.rows = rows;
+  solver->rest.runs = DEAR_RUNS;
 }
 
 /* dearest: the cost of the run's direct solves; 0: there were none. */
@@ -530,14 +591,14 @@ static void note_vain(hapi_solver *solver, uint32_t dearest)
     return;
   }
   if (solver->direct_solves > 0 || dearest <= VAIN_COST) {
-    solver->vain_runs = 0;
+    solver->rest.vain = 0;
     return;
   }
-  if (++solver->vain_runs >= VAIN_RUNS && solver->dear_rows == 0) {
-    uint32_t again = solver->vain_runs - VAIN_RUNS;
+  if (++solver->rest.vain >= VAIN_RUNS && solver->rest.rows == 0) {
+    uint32_t again = solver->rest.vain - VAIN_RUNS;
     uint32_t rest = again < 8 ? VAIN_REST << again : VAIN_REST_MOST;
-    solver->dear_rows = solver->row_count;
-    solver->dear_runs = rest < VAIN_REST_MOST ? rest : VAIN_REST_MOST;
+    solver->rest.rows = solver->row_count;
+    solver->rest.runs = rest < VAIN_REST_MOST ? rest : VAIN_REST_MOST;
   }
 }
 
@@ -546,9 +607,9 @@ static void note_vain(hapi_solver *solver, uint32_t dearest)
 static bool stays_dear(hapi_solver *solver)
 {
   bool alike =
-      solver->dear_rows > 0 && 10 * (uint64_t)solver->row_count >= 9 * (uint64_t)solver->dear_rows;
-  if (!alike || --solver->dear_runs == 0) {
-    solver->dear_rows = 0;
+      solver->rest.rows > 0 && 10 * (uint64_t)solver->row_count >= 9 * (uint64_t)solver->rest.rows;
+  if (!alike || --solver->rest.runs == 0) {
+    solver->rest.rows = 0;
     return false;
   }
   return true;
@@ -602,11 +663,24 @@ static double sweeps_rate(double before2, double before, double now)
 static bool sweeps_suffice(const hapi_solver *solver, double rate)
 {
   double share = 1.0;
-  for (int i = 0; i < DIRECT_SWEEPS; ++i) {
+  uint32_t sweeps = DIRECT_SWEEPS * solver->row_count / sweep_cost(solver);
+  for (uint32_t i = 0; i < sweeps; ++i) {
     share *= rate;
   }
   return share * solver->residual < HAPI_COARSE &&
          share * share * solver->corrected < solver->coarse;
+}
+
+/* It goes by rows. */
+static uint32_t direct_run(hapi_solver *solver, uint32_t budget)
+{
+  if (!solver->packs.in_use) {
+    return hapi_direct_run(solver, budget);
+  }
+  hapi_packs_store(&solver->packs, solver->rows);
+  uint32_t spent = hapi_direct_run(solver, budget);
+  hapi_packs_load(&solver->packs, solver->rows);
+  return spent;
 }
 
 void hapi_solver_run(hapi_solver *solver)
@@ -624,7 +698,7 @@ void hapi_solver_run(hapi_solver *solver)
   bool direct = may && !dear;
   uint32_t dearest = 0;
   sweep_way way = {0};
-  bool ahead = way_place(solver, &way);
+  solver->packs.in_use = false;
   for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
     hapi_row_ready(solver, i);
   }
@@ -632,10 +706,14 @@ void hapi_solver_run(hapi_solver *solver)
     run_apart(solver);
     return;
   }
+  solver->packs.in_use = hapi_packs_begin(&solver->packs, solver->rows, rows, solver->body_count);
+  bool ahead = way_place(solver, &way);
+  uint32_t cost = sweep_cost(solver);
+  uint32_t direct_from = solver->packs.in_use ? PACKED_SWEEPS : 2; /* sweeps */
   double before[2] = {0.0, 0.0}; /* corrected, after the last sweep and the one before */
   for (uint32_t rounds = 0; rows > 0;) {
     if (ahead && solver->sweeps >= 2) {
-      updates_spend(solver, &left, way_cost(rows));
+      updates_spend(solver, &left, cost / 4);
       if (way.begun) {
         way_go_on(solver, &way);
       } else {
@@ -643,34 +721,39 @@ void hapi_solver_run(hapi_solver *solver)
       }
     }
     rows_sweep(solver);
-    updates_spend(solver, &left, rows);
+    updates_spend(solver, &left, cost);
     double rate = sweeps_rate(before[1], before[0], solver->corrected);
     before[1] = before[0];
     before[0] = solver->corrected;
     if (is_settled(solver) ||
-        (solver->sweeps >= 2 && (left < rows || solver->sweeps == solver->max_sweeps))) {
+        (solver->sweeps >= 2 && (left < cost || solver->sweeps == solver->max_sweeps))) {
       break;
     }
     /* Direct solves may have one half of the budget: where they lead in circles between two sets of
      * active rows, sweeps from the second half still come near, and the next tick starts from
      * there. */
-    if (direct && solver->sweeps >= 2 && 2 * left > solver->update_budget &&
+    if (direct && solver->sweeps >= direct_from && 2 * left > solver->update_budget &&
         !sweeps_suffice(solver, rate) && (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
-      uint32_t spent = hapi_direct_run(solver, (uint32_t)left - rows);
+      uint32_t spent = direct_run(solver, (uint32_t)left - cost);
       updates_spend(solver, &left, spent);
       way.begun = false;
       before[0] = before[1] = 0.0;
+      bool first = dearest == 0;
       dearest = spent > dearest ? spent : dearest;
       direct = !solver->too_dear; /* now, and so in the next round */
       if (direct && solver->direct_residual < solver->tolerance) {
         solver->residual = solver->direct_residual;
         break;
       }
-      if (!direct) {
-        note_dear(solver, left, rows);
+      if (!direct && first) {
+        note_dear(solver, rows);
       }
     }
-    rounds += solver->sweeps >= 2;
+    rounds += solver->sweeps >= direct_from;
+  }
+  if (solver->packs.in_use) {
+    hapi_packs_store(&solver->packs, solver->rows);
+    solver->packs.in_use = false;
   }
   note_vain(solver, dearest);
   check_finite(solver);

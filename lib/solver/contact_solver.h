@@ -21,7 +21,15 @@
 #include <stdint.h>
 
 #include "base/six.h"
+#include "solver/packs.h"
 #include "solver/row.h"
+
+/* Direct solves that were too dear, or in vain, are left out for some runs. */
+typedef struct hapi_direct_rest {
+  uint32_t rows; /* they were for so many; 0: nothing rests */
+  uint32_t runs; /* for so many more */
+  uint32_t vain; /* runs one after the other in which no direct solve was any better */
+} hapi_direct_rest;
 
 typedef struct hapi_solver {
   hapi_row *rows;
@@ -41,14 +49,13 @@ typedef struct hapi_solver {
   uint32_t direct_rows;   /* islands of at most this many free rows are solved directly; 0: none */
   double *work;           /* for direct solves; an island that does not fit is left to sweeps */
   size_t work_count;      /* doubles, see HAPI_SOLVER_WORK */
+  hapi_packs packs;       /* its arrays; work NULL: rows are updated one by one */
 
   bool ready; /* in: every row is (hapi_row_ready), or the rows are those of the last run, with
                          its impulses in v, but for hapi_row_retarget */
   bool apart; /* in: all rows are single, and no two have a body in common: one sweep solves them */
-  uint32_t dear_rows; /* inner: direct solves were too dear for so many rows; 0: they were not */
-  uint32_t dear_runs; /* inner: for so many runs more */
-  uint32_t vain_runs; /* inner: one after the other, in which no direct solve was any better */
-  bool too_dear;      /* inner: an island was too large or too dear for the budget */
+  hapi_direct_rest rest;  /* inner */
+  bool too_dear;          /* inner: an island was too large or too dear for the budget */
   double direct_residual; /* inner: the largest correction due after a direct run, m/s */
   uint32_t sweeps;        /* out */
   uint64_t updates;       /* out: row updates, direct solves counted by their cost */
@@ -89,8 +96,9 @@ void hapi_row_ready(hapi_solver *solver, uint32_t index);
 void hapi_single_ready(hapi_solver *solver, uint32_t index, double response);
 
 /* The same of the 1 to 3 rows of a contact, of the same two bodies: its normal, then its
- * frictions. */
-void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count);
+ * frictions. by_mass: linear parts are those of one direction a row, b's opposite to a's, and what
+ * responds does so by its mass and inertia. */
+void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, bool by_mass);
 
 /* The same of rows that were ready in the last run, all of use, with the impulses of that run and
  * with another target. */
@@ -129,6 +137,12 @@ double hapi_ball_update(hapi_solver *solver, hapi_row *first);
 /* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
  * updates. Sets too_dear and direct_residual. Rows are prepared, v has the impulses. */
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
+
+/* Whether a responds: j A j^T is 0 only if it does not. */
+static inline bool hapi_row_moves_a(const hapi_row *row)
+{
+  return hapi_dot6(row->ja, row->ba) != 0.0;
+}
 
 static inline double hapi_clamp(double x, double lo, double hi)
 {

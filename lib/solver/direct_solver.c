@@ -35,7 +35,7 @@ static void chain_rows(hapi_solver *solver, uint16_t *leaf, lists *out)
   for (uint32_t i = solver->row_count; i-- > 0;) {
     hapi_row *row = &solver->rows[i];
     if (row->inverse != 0.0) {
-      uint16_t r = hapi_root(leaf, (uint16_t)(row->moves_a ? row->a : row->b));
+      uint16_t r = hapi_root(leaf, (uint16_t)(hapi_row_moves_a(row) ? row->a : row->b));
       row->next = out->leaf_head[r];
       out->leaf_tail[r] = out->leaf_head[r] == HAPI_NO_SOLVER_ROW ? i : out->leaf_tail[r];
       out->leaf_head[r] = i;
@@ -73,7 +73,7 @@ static void islands_split(hapi_solver *solver, lists *out)
   }
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
-    if (row->inverse != 0.0 && row->paired && row->moves_a) {
+    if (row->inverse != 0.0 && row->paired && hapi_row_moves_a(row)) {
       hapi_unite(whole, row->a, row->b);
       if (!hapi_is_hub(solver, row->b)) {
         hapi_unite(leaf, row->a, row->b);

@@ -244,7 +244,8 @@ bool hapi_island_gather(hapi_island *is)
   memset(is->local, 0xff, is->solver->body_count * sizeof is->local[0]);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     bool takes_b = rows[i].paired && !(is->held && hapi_is_hub(is->solver, rows[i].b));
-    if ((rows[i].moves_a && !add_body(is, rows[i].a)) || (takes_b && !add_body(is, rows[i].b))) {
+    if ((hapi_row_moves_a(&rows[i]) && !add_body(is, rows[i].a)) ||
+        (takes_b && !add_body(is, rows[i].b))) {
       return false;
     }
   }

@@ -5,6 +5,12 @@
 
 #include <stdint.h>
 
+/* hapi_row.triple; 0: none. */
+#define HAPI_TRIPLE_ANY 1u
+#define HAPI_TRIPLE_BY_MASS \
+  2u /* of bodies that answer by their mass, of which a does; the normal's
+                                  bounds are 0 .. HUGE_VAL */
+
 /* One scalar row, in the order in which a sweep reads it. Three rows of a contact stand together:
  * normal, then its two frictions. Chains of bodies converge best in their order, beginning at the
  * hand. A body that does not respond in one row must not respond in any. */
@@ -29,12 +35,12 @@ typedef struct hapi_row {
                       vector, no longer than mu p: how many; 0: the pyramid */
   uint8_t round;  /* of the others: how many of them come before */
   uint8_t single; /* a static partner: jb and bb are 0 and are not looked at */
-  uint8_t triple; /* inner: a normal whose two frictions come next, all of use */
-  uint8_t moves_a; /* inner: a responds */
-  uint8_t paired;  /* inner: b responds */
-  uint8_t state;   /* inner, of direct_solver.c */
-  uint32_t next;   /* inner: of the same island */
-  double target;   /* m/s */
+  uint8_t triple; /* inner: HAPI_TRIPLE_, of a normal whose two frictions come next, all of use */
+  uint8_t paired; /* inner: b responds */
+  uint8_t state;  /* inner, of direct_solver.c */
+  uint32_t next;  /* inner: of the same island */
+  uint64_t made;  /* inner, of a normal of a triple: no other contact of this solver has it */
+  double target;  /* m/s */
   double jb[6]; /* 0 for a static partner; a sweep reads this and the next where b responds only */
   double bb[6];
 } hapi_row;

@@ -38,7 +38,7 @@ static uint32_t island_of(const hapi_solver *solver, const rays *r, uint32_t bod
 
 static uint32_t row_island(const hapi_solver *solver, const rays *r, const hapi_row *row)
 {
-  return island_of(solver, r, row->moves_a ? row->a : row->b);
+  return island_of(solver, r, hapi_row_moves_a(row) ? row->a : row->b);
 }
 
 static void find_islands(const hapi_solver *solver, rays *out)
@@ -51,7 +51,7 @@ static void find_islands(const hapi_solver *solver, rays *out)
   }
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
-    if (row->inverse != 0.0 && row->paired && row->moves_a) {
+    if (row->inverse != 0.0 && row->paired && hapi_row_moves_a(row)) {
       hapi_unite(out->root, row->a, row->b);
     }
   }

@@ -29,6 +29,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
 {
   const hapi_capacity *c = &tick->capacity;
   const size_t tools = (size_t)2 * c->tool_points;
+  const size_t packs = tick->rows.solver.packs.contact_capacity;
   const size_t places = (size_t)c->bodies + c->pointers + 1; /* and the static world */
   const hapi_tick_array all[HAPI_TICK_ARRAYS] = {
       {&tick->pointers.of, c->pointers, sizeof *tick->pointers.of, true},
@@ -60,6 +61,17 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(rows.solver.v, places),
       ARRAY(rows.solver.free, places),
       ARRAY(rows.solver.work, tick->rows.solver.work_count),
+      ARRAY(rows.solver.packs.of, packs),
+      ARRAY(rows.solver.packs.contacts, packs),
+      ARRAY(rows.solver.packs.impulse, packs),
+      ARRAY(rows.solver.packs.response, packs),
+      ARRAY(rows.solver.packs.packables, HAPI_LANES * packs),
+      ARRAY(rows.solver.packs.units, HAPI_LANES * packs),
+      ARRAY(rows.solver.packs.order, HAPI_LANES * packs),
+      ARRAY(rows.solver.packs.sorted, HAPI_LANES * packs),
+      ARRAY(rows.solver.packs.loose, HAPI_LANES * packs + 1),
+      ARRAY(rows.solver.packs.levels, places),
+      ARRAY(rows.solver.packs.colors, places),
   };
   memcpy(out, all, sizeof all);
 }
@@ -103,7 +115,8 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->rows.unsolved_all = 0;
   tick->rows.work = (hapi_work){.most = 0};
   solver->row_count = solver->body_count = 0;
-  solver->dear_rows = solver->dear_runs = solver->vain_runs = 0;
+  hapi_packs_forget(&solver->packs);
+  solver->rest = (hapi_direct_rest){0};
   solver->ready = true; /* as the rows are made */
   tick->guard = (hapi_guard){.mode = tick->guard.mode};
   memset(&tick->sample, 0, sizeof tick->sample);

@@ -1,0 +1,6 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "solver/pack_sweep.h"
+
+/* With the registers that every processor has. */
+const hapi_pack_work hapi_pack_work_pairs = {packs_sweep, way_energy, way_go_on};

@@ -1,0 +1,375 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#include "solver/packs.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/assert.h"
+
+#define PACKABLE_LEAST 8u /* contacts: fewer are swept as quickly one by one */
+#define FULL_LEAST 2u     /* lanes a pack, in the mean: likewise */
+#define COLORS 64u
+#define LOOSE_COLOR 64u /* of a pair beyond all colors */
+/* Levels of a stack that packs are for. One of 30 under a hand gains energy by many sweeps in the
+ * order of packs, and not by those of few rows and a direct solve; one of 20 does not. The reason is
+ * not known. */
+#define HEIGHT_MOST 8u
+#define COUNT_MOST 15u /* contacts of a pair that the order tells apart */
+
+static bool is_packable(const hapi_row *row)
+{
+  return row->triple == HAPI_TRIPLE_BY_MASS;
+}
+
+/* ---- a lane ---- */
+
+static void lane_set_impulses(const hapi_packs *packs, uint32_t place, const hapi_row *row)
+{
+  uint32_t at = place / HAPI_LANES;
+  uint32_t lane = place % HAPI_LANES;
+  for (int i = 0; i < 3; ++i) {
+    packs->contacts[at].drive[i][lane] = row[i].drive;
+    packs->impulse[at][i][lane] = row[i].impulse;
+  }
+}
+
+/* 1/kg, exactly as in the rows: from the largest part of the direction. */
+static double inverse_mass(const double j[6], const double b[6])
+{
+  int k = fabs(j[0]) > fabs(j[1]) ? 0 : 1;
+  k = fabs(j[k]) > fabs(j[2]) ? k : 2;
+  return b[k] / j[k];
+}
+
+static void lane_fill(const hapi_packs *packs, const hapi_pack *pack, uint32_t place,
+                      const hapi_row *row)
+{
+  uint32_t at = place / HAPI_LANES;
+  uint32_t lane = place % HAPI_LANES;
+  hapi_pack_contact *c = &packs->contacts[at];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      c->direction[i][k][lane] = row[i].ja[k];
+      c->turn_a[i][k][lane] = row[i].ja[3 + k];
+      c->spin_a[i][k][lane] = row[i].ba[3 + k];
+    }
+    c->softness[i][lane] = row[i].softness;
+    c->inverse[i][lane] = row[i].inverse;
+    packs->response[at][i][lane] = row[i].response;
+  }
+  c->mu[0][lane] = row[1].mu;
+  c->mu[1][lane] = row[2].mu;
+  c->coupling[0][lane] = row[1].coupling[0];
+  c->coupling[1][lane] = row[2].coupling[0];
+  c->coupling[2][lane] = row[2].coupling[1];
+  for (int i = 0; pack->paired && i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      c->turn_b[i][k][lane] = row[i].jb[3 + k];
+      c->spin_b[i][k][lane] = row[i].bb[3 + k];
+    }
+  }
+  lane_set_impulses(packs, place, row);
+}
+
+/* ---- units, colors and their order ---- */
+
+static void units_find(hapi_packs *packs, const hapi_row *rows, uint32_t row_count)
+{
+  uint32_t most = HAPI_LANES * packs->contact_capacity;
+  uint32_t units = 0;
+  packs->packable_count = 0;
+  for (uint32_t i = 0; i < row_count && packs->packable_count < most; ++i) {
+    const hapi_row *row = &rows[i];
+    if (!is_packable(row)) {
+      continue;
+    }
+    const hapi_row *last =
+        packs->packable_count > 0 ? &rows[packs->packables[packs->packable_count - 1].row] : NULL;
+    if (last == NULL || last + 3 != row || last->a != row->a || last->b != row->b) {
+      packs->units[units++] =
+          (hapi_pack_unit){.first = packs->packable_count, .paired = row->paired};
+    }
+    packs->packables[packs->packable_count++] =
+        (hapi_packable){.row = i, .a = row->a, .b = row->b, .place = HAPI_NO_PLACE};
+    ++packs->units[units - 1].count;
+    i += 2;
+  }
+  packs->unit_count = units;
+}
+
+static bool level_lower(uint32_t *level, uint32_t below)
+{
+  bool lowers = below != 0 && (*level == 0 || *level > below + 1);
+  *level = lowers ? below + 1 : *level;
+  return lowers;
+}
+
+/* How far a load has to go until something holds it: a row on a floor is low, a stack is high. */
+static void levels_find(hapi_packs *packs, uint32_t body_count)
+{
+  bool again = true;
+  memset(packs->levels, 0, body_count * sizeof *packs->levels);
+  for (uint32_t i = 0; i < packs->unit_count; ++i) {
+    if (!packs->units[i].paired) {
+      packs->levels[packs->packables[packs->units[i].first].a] = 1;
+    }
+  }
+  while (again) {
+    again = false;
+    for (uint32_t i = 0; i < packs->unit_count; ++i) {
+      const hapi_packable *at = &packs->packables[packs->units[i].first];
+      if (packs->units[i].paired) {
+        again = level_lower(&packs->levels[at->a], packs->levels[at->b]) || again;
+        again = level_lower(&packs->levels[at->b], packs->levels[at->a]) || again;
+      }
+    }
+  }
+  packs->height = 1;
+  for (uint32_t i = 0; i < body_count; ++i) {
+    packs->height = packs->levels[i] > packs->height ? packs->levels[i] : packs->height;
+  }
+}
+
+/* The first color that neither body has. */
+static void units_color(hapi_packs *packs, uint32_t body_count)
+{
+  memset(packs->colors, 0, body_count * sizeof *packs->colors);
+  for (uint32_t i = 0; i < packs->unit_count; ++i) {
+    hapi_pack_unit *unit = &packs->units[i];
+    const hapi_packable *at = &packs->packables[unit->first];
+    uint64_t used = packs->colors[at->a] | (unit->paired ? packs->colors[at->b] : 0);
+    uint32_t color = 0;
+    while (color < COLORS && (used >> color & 1) != 0) {
+      ++color;
+    }
+    unit->color = (uint8_t)color;
+    if (color < COLORS) {
+      packs->colors[at->a] |= (uint64_t)1 << color;
+      packs->colors[at->b] |= unit->paired ? (uint64_t)1 << color : 0;
+    }
+  }
+}
+
+static uint32_t key_of_count(const hapi_pack_unit *unit)
+{
+  return unit->count < COUNT_MOST ? COUNT_MOST - unit->count : 0;
+}
+
+static uint32_t key_of_color(const hapi_pack_unit *unit)
+{
+  return 2u * unit->color + unit->paired;
+}
+
+/* Stable, from one list to the other. */
+static void units_sort(const hapi_packs *packs, uint32_t (*key)(const hapi_pack_unit *),
+                       const uint32_t *from, uint32_t *to)
+{
+  uint32_t begins[2 * (COLORS + 1) + 1] = {0};
+  for (uint32_t i = 0; i < packs->unit_count; ++i) {
+    ++begins[key(&packs->units[from[i]]) + 1];
+  }
+  for (uint32_t k = 1; k < sizeof begins / sizeof begins[0]; ++k) {
+    begins[k] += begins[k - 1];
+  }
+  for (uint32_t i = 0; i < packs->unit_count; ++i) {
+    to[begins[key(&packs->units[from[i]])]++] = from[i];
+  }
+}
+
+/* By color, and those with many contacts first: what is side by side is of one length. */
+static void units_order(hapi_packs *packs)
+{
+  for (uint32_t i = 0; i < packs->unit_count; ++i) {
+    packs->order[i] = i;
+  }
+  units_sort(packs, key_of_count, packs->order, packs->sorted);
+  units_sort(packs, key_of_color, packs->sorted, packs->order);
+}
+
+/* ---- packs ---- */
+
+/* Of so many units from the list; false: there is no room. */
+static bool pack_add(hapi_packs *packs, const hapi_row *rows, const uint32_t *units, uint32_t lanes)
+{
+  hapi_pack *pack = &packs->of[packs->count];
+  memset(pack, 0, sizeof *pack);
+  pack->first = packs->contact_count;
+  pack->paired = packs->units[units[0]].paired;
+  for (uint32_t lane = 0; lane < lanes; ++lane) {
+    uint32_t count = packs->units[units[lane]].count;
+    pack->count = count > pack->count ? count : pack->count;
+  }
+  if (pack->first + pack->count > packs->contact_capacity) {
+    return false;
+  }
+  memset(&packs->contacts[pack->first], 0, pack->count * sizeof *packs->contacts);
+  memset(packs->impulse[pack->first], 0, pack->count * sizeof *packs->impulse);
+  memset(packs->response[pack->first], 0, pack->count * sizeof *packs->response);
+  for (uint32_t lane = 0; lane < lanes; ++lane) {
+    const hapi_pack_unit *unit = &packs->units[units[lane]];
+    const hapi_row *row = &rows[packs->packables[unit->first].row];
+    pack->a[lane] = row->a;
+    pack->b[lane] = row->b;
+    for (uint32_t i = 0; i < unit->count; ++i) {
+      hapi_packable *packable = &packs->packables[unit->first + i];
+      packable->place = (pack->first + i) * HAPI_LANES + lane;
+      packable->pack = packs->count;
+    }
+  }
+  packs->contact_count += pack->count;
+  ++packs->count;
+  return true;
+}
+
+static void packs_add(hapi_packs *packs, const hapi_row *rows)
+{
+  packs->count = packs->contact_count = 0;
+  uint32_t lanes = 0;
+  for (uint32_t i = 0; i < packs->unit_count; i += lanes) {
+    const uint32_t *units = &packs->order[i];
+    uint32_t key = key_of_color(&packs->units[units[0]]);
+    lanes = 1;
+    while (lanes < HAPI_LANES && i + lanes < packs->unit_count &&
+           key_of_color(&packs->units[units[lanes]]) == key) {
+      ++lanes;
+    }
+    if (packs->units[units[0]].color == LOOSE_COLOR || !pack_add(packs, rows, units, lanes)) {
+      return; /* the rest is loose */
+    }
+  }
+}
+
+static void loose_add(hapi_packs *packs, uint32_t first, uint32_t end)
+{
+  if (first < end) {
+    packs->loose[packs->loose_count++] = (hapi_loose_rows){first, end};
+    packs->loose_rows += end - first;
+  }
+}
+
+static void loose_find(hapi_packs *packs, uint32_t row_count)
+{
+  uint32_t begin = 0;
+  packs->loose_count = packs->loose_rows = 0;
+  for (uint32_t i = 0; i < packs->packable_count; ++i) {
+    const hapi_packable *packable = &packs->packables[i];
+    if (packable->place != HAPI_NO_PLACE) {
+      loose_add(packs, begin, packable->row);
+      begin = packable->row + 3;
+    }
+  }
+  loose_add(packs, begin, row_count);
+}
+
+static void packs_fill(const hapi_packs *packs, const hapi_row *rows)
+{
+  for (uint32_t i = 0; i < packs->packable_count; ++i) {
+    hapi_packable *packable = &packs->packables[i];
+    if (packable->place == HAPI_NO_PLACE) {
+      continue;
+    }
+    hapi_pack *pack = &packs->of[packable->pack];
+    const hapi_row *row = &rows[packable->row];
+    uint32_t lane = packable->place % HAPI_LANES;
+    if (packable->made == row->made) {
+      lane_set_impulses(packs, packable->place, row);
+      continue;
+    }
+    packable->made = row->made;
+    pack->mass_a[lane] = inverse_mass(row->ja, row->ba);
+    pack->mass_b[lane] = pack->paired ? inverse_mass(row->jb, row->bb) : 0.0;
+    lane_fill(packs, pack, packable->place, row);
+  }
+}
+
+/* Whether what may be packed is what it was, in the same places. */
+static bool packs_hold(const hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
+                       uint32_t body_count)
+{
+  if (packs->count == 0 || packs->row_count != row_count || packs->body_count != body_count) {
+    return false;
+  }
+  for (uint32_t i = 0; i < packs->packable_count; ++i) {
+    const hapi_packable *packable = &packs->packables[i];
+    const hapi_row *row = &rows[packable->row];
+    if (packable->place == HAPI_NO_PLACE || !is_packable(row) || row->a != packable->a ||
+        row->b != packable->b || row->paired != packs->of[packable->pack].paired) {
+      return false;
+    }
+  }
+  for (uint32_t i = 0; i < packs->loose_count; ++i) {
+    for (uint32_t k = packs->loose[i].first; k < packs->loose[i].end; ++k) {
+      if (is_packable(&rows[k])) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+/* Whether four at once are quicker than one by one. */
+static bool packs_pay(const hapi_packs *packs)
+{
+  uint32_t packed = (packs->row_count - packs->loose_rows) / 3;
+  return packs->count > 0 && packed >= FULL_LEAST * packs->contact_count;
+}
+
+bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
+                      uint32_t body_count)
+{
+  if (packs->work == NULL || body_count > packs->body_capacity || row_count < 3 * PACKABLE_LEAST) {
+    packs->count = 0;
+    return false;
+  }
+  if (!packs_hold(packs, rows, row_count, body_count)) {
+    packs->row_count = row_count;
+    packs->body_count = body_count;
+    packs->count = 0;
+    units_find(packs, rows, row_count);
+    if (packs->packable_count < PACKABLE_LEAST) {
+      return false;
+    }
+    levels_find(packs, body_count);
+    if (packs->height > HEIGHT_MOST) {
+      return false;
+    }
+    units_color(packs, body_count);
+    units_order(packs);
+    packs_add(packs, rows);
+    loose_find(packs, row_count);
+    if (!packs_pay(packs)) {
+      packs->count = 0;
+      return false;
+    }
+  }
+  packs_fill(packs, rows);
+  return true;
+}
+
+void hapi_packs_store(const hapi_packs *packs, hapi_row *rows)
+{
+  for (uint32_t i = 0; i < packs->packable_count; ++i) {
+    const hapi_packable *packable = &packs->packables[i];
+    for (int k = 0; packable->place != HAPI_NO_PLACE && k < 3; ++k) {
+      rows[packable->row + (uint32_t)k].impulse =
+          packs->impulse[packable->place / HAPI_LANES][k][packable->place % HAPI_LANES];
+    }
+  }
+}
+
+void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows)
+{
+  for (uint32_t i = 0; i < packs->packable_count; ++i) {
+    const hapi_packable *packable = &packs->packables[i];
+    if (packable->place != HAPI_NO_PLACE) {
+      lane_set_impulses(packs, packable->place, &rows[packable->row]);
+    }
+  }
+}
+
+void hapi_packs_forget(hapi_packs *packs)
+{
+  packs->count = packs->contact_count = packs->packable_count = 0;
+  packs->loose_count = packs->loose_rows = packs->row_count = packs->body_count = 0;
+}

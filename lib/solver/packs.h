@@ -1,0 +1,129 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+#ifndef HAPODE_SOLVER_PACKS_H
+#define HAPODE_SOLVER_PACKS_H
+
+/* Contacts of four pairs of bodies side by side, so that a sweep takes four rows at once. What is
+ * side by side must not have a body in common: the pairs of bodies get colours, of which no body
+ * has one twice, and a pack is of one colour. A sweep takes the rows without a pack first, then the
+ * colours one after the other. */
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "solver/row.h"
+
+#define HAPI_LANES 4u
+#define HAPI_NO_PLACE UINT32_MAX
+
+/* Three rows a lane: normal, then two frictions. Their linear Jacobians are `direction` for a and
+ * the opposite for b. An empty lane has zeros. */
+typedef struct hapi_pack_contact {
+  double direction[3][3][HAPI_LANES];
+  double turn_a[3][3][HAPI_LANES]; /* ja, its angular part */
+  double spin_a[3][3][HAPI_LANES]; /* ba, likewise */
+  double drive[3][HAPI_LANES];     /* this and the next: see hapi_row */
+  double softness[3][HAPI_LANES];
+  double inverse[3][HAPI_LANES];
+  double mu[2][HAPI_LANES];
+  double coupling[3][HAPI_LANES];  /* of rows 0 and 1, 0 and 2, 1 and 2 */
+  double turn_b[3][3][HAPI_LANES]; /* this and the next: not used where b does not respond */
+  double spin_b[3][3][HAPI_LANES];
+} hapi_pack_contact;
+
+typedef struct hapi_pack {
+  uint32_t first; /* contact, and how many one below the other */
+  uint32_t count;
+  bool paired;            /* b responds */
+  uint32_t a[HAPI_LANES]; /* bodies; empty lanes: 0 */
+  uint32_t b[HAPI_LANES];
+  double mass_a[HAPI_LANES]; /* inverse, 1/kg */
+  double mass_b[HAPI_LANES];
+} hapi_pack;
+
+/* A contact that may be packed: where its rows are, and where it is now. */
+typedef struct hapi_packable {
+  uint32_t row; /* its normal's */
+  uint32_t a;
+  uint32_t b;
+  uint32_t place; /* contact x HAPI_LANES + lane; HAPI_NO_PLACE: in no pack */
+  uint32_t pack;
+  uint64_t made; /* see hapi_row, of what was packed */
+} hapi_packable;
+
+/* Successive packable contacts of the same bodies. */
+typedef struct hapi_pack_unit {
+  uint32_t first; /* packable, and how many */
+  uint32_t count;
+  uint8_t color;
+  bool paired;
+} hapi_pack_unit;
+
+/* Rows that are in no pack, from one of them to before another. */
+typedef struct hapi_loose_rows {
+  uint32_t first;
+  uint32_t end;
+} hapi_loose_rows;
+
+/* Of a sweep's rows. */
+typedef struct hapi_corrections {
+  double largest; /* m/s */
+  double energy2; /* J, sum of impulse^2 x response */
+} hapi_corrections;
+
+struct hapi_packs;
+
+/* How the packs are worked on; by what the processor can, with the same bits. */
+typedef struct hapi_pack_work {
+  void (*sweep)(const struct hapi_packs *packs, double (*v)[6], bool forward, hapi_corrections *io);
+  /* See sweep_way in contact_solver.c: J, and the next begin. */
+  double (*way_energy)(const double *now, const double *begin, const double *response,
+                       size_t count);
+  void (*way_go_on)(double *now, double *begin, double *way, double share, size_t count);
+} hapi_pack_work;
+
+typedef struct hapi_packs {
+  const hapi_pack_work *work; /* NULL: nothing is packed */
+  hapi_pack *of;              /* contact_capacity, as the next four */
+  hapi_pack_contact *contacts;
+  double (*impulse)[3][HAPI_LANES]; /* N s, by contact */
+  double (*response)[3][HAPI_LANES];
+  hapi_packable *packables; /* HAPI_LANES x contact_capacity, as the next four */
+  hapi_pack_unit *units;
+  uint32_t *order; /* of the units */
+  uint32_t *sorted;
+  hapi_loose_rows *loose;
+  uint32_t *levels; /* by body, as the next: contacts between it and what does not respond */
+  uint64_t *colors; /* by body, one bit each; capacity as of the solver's v */
+  uint32_t contact_capacity;
+  uint32_t body_capacity;
+  uint32_t count; /* packs; 0: all rows are loose */
+  uint32_t contact_count;
+  uint32_t packable_count;
+  uint32_t unit_count;
+  uint32_t loose_count;
+  uint32_t loose_rows;
+  uint32_t height;    /* the highest level */
+  bool in_use;        /* the impulses of packed rows are here */
+  uint64_t made;      /* see hapi_row, the last one */
+  uint32_t row_count; /* all rows, when the packs were made */
+  uint32_t body_count;
+} hapi_packs;
+
+extern const hapi_pack_work hapi_pack_work_pairs;       /* on every processor */
+extern const hapi_pack_work *const hapi_pack_work_avx2; /* NULL: not built */
+/* What this processor does best. Not on the tick: it asks the processor. */
+const hapi_pack_work *hapi_pack_work_best(void);
+
+/* The packs of these rows, with their impulses; those of the last call stay where they hold.
+ * False: nothing is packed. */
+bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
+                      uint32_t body_count);
+/* The impulses to the rows, and back. */
+void hapi_packs_store(const hapi_packs *packs, hapi_row *rows);
+void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows);
+/* Nothing is known of any rows. */
+void hapi_packs_forget(hapi_packs *packs);
+
+#endif

@@ -1,0 +1,464 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Contacts side by side in packs: what they end at is what the rows ask for, worked out here from
+ * nothing but the rows; the same bits by AVX2, by pairs and in plain C (`plain_`, see meson.build);
+ * packs that are kept go the way of packs that are made anew. */
+
+#include "tests/tap.h"
+
+#include <stdint.h>
+
+#include "solver/contact_solver.h"
+
+#define BODIES 40u
+#define PAIRS 90u
+#define PAIR_CONTACTS 4u
+#define OTHERS 12u
+#define ROWS (3 * PAIRS * PAIR_CONTACTS + OTHERS)
+#define PACKS (PAIRS * PAIR_CONTACTS)
+#define WORK HAPI_SOLVER_WORK(2 * ROWS, BODIES)
+
+void plain_hapi_solver_run(hapi_solver *solver);
+void plain_hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, bool by_mass);
+void plain_hapi_row_ready(hapi_solver *solver, uint32_t index);
+extern const hapi_pack_work plain_hapi_pack_work_pairs;
+
+typedef struct problem {
+  hapi_row rows[ROWS];
+  double v[BODIES][6];
+  double free_v[BODIES][6];
+  double work[WORK];
+  hapi_pack packs[PACKS];
+  hapi_pack_contact contacts[PACKS];
+  double impulse[PACKS][3][HAPI_LANES];
+  double response[PACKS][3][HAPI_LANES];
+  hapi_packable packables[HAPI_LANES * PACKS];
+  hapi_pack_unit units[HAPI_LANES * PACKS];
+  uint32_t order[HAPI_LANES * PACKS];
+  uint32_t sorted[HAPI_LANES * PACKS];
+  hapi_loose_rows loose[HAPI_LANES * PACKS + 1];
+  uint32_t levels[BODIES];
+  uint64_t colors[BODIES];
+  hapi_solver solver;
+} problem;
+
+static problem one;
+static problem two;
+static double mass[BODIES]; /* inverse; 0: does not respond */
+static uint64_t state;
+
+static double random_next(void) /* -1 .. 1 */
+{
+  state = state * 6364136223846793005u + 1442695040888963407u;
+  return (double)(int64_t)state / 9.3e18;
+}
+
+static void vector_cross(const double a[3], const double b[3], double out[3])
+{
+  for (int k = 0; k < 3; ++k) {
+    out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+  }
+}
+
+static double vector_dot(const double *a, const double *b, int count)
+{
+  double sum = 0.0;
+  for (int k = 0; k < count; ++k) {
+    sum += a[k] * b[k];
+  }
+  return sum;
+}
+
+static void random_frame(double out[3][3])
+{
+  for (int k = 0; k < 3; ++k) {
+    out[0][k] = random_next();
+    out[1][k] = random_next();
+  }
+  double length = sqrt(vector_dot(out[0], out[0], 3));
+  for (int k = 0; k < 3; ++k) {
+    out[0][k] /= length;
+  }
+  double along = vector_dot(out[0], out[1], 3);
+  for (int k = 0; k < 3; ++k) {
+    out[1][k] -= along * out[0][k];
+  }
+  length = sqrt(vector_dot(out[1], out[1], 3));
+  for (int k = 0; k < 3; ++k) {
+    out[1][k] /= length;
+  }
+  vector_cross(out[0], out[1], out[2]);
+}
+
+static void row_column(uint32_t body, double sign, const double direction[3], const double arm[3],
+                       double j[6], double b[6])
+{
+  for (int k = 0; k < 3; ++k) {
+    j[k] = sign * direction[k];
+  }
+  vector_cross(arm, j, j + 3);
+  for (int k = 0; k < 6; ++k) { /* the turning of a round body of 5 cm */
+    b[k] = j[k] * mass[body] * (k < 3 ? 1.0 : 1000.0);
+  }
+}
+
+/* One of a pair's contacts, 3 rows. */
+static void contact_fill(hapi_row *rows, uint32_t a, uint32_t b, double frame[3][3], double mu)
+{
+  double arm[2][3];
+  for (int k = 0; k < 3; ++k) {
+    arm[0][k] = 0.05 * random_next();
+    arm[1][k] = 0.05 * random_next();
+  }
+  for (int i = 0; i < 3; ++i) {
+    hapi_row *row = &rows[i];
+    memset(row, 0, sizeof *row);
+    row->a = a;
+    row->b = b;
+    row->single = b == 0;
+    row_column(a, 1.0, frame[i], arm[0], row->ja, row->ba);
+    if (b != 0) {
+      row_column(b, -1.0, frame[i], arm[1], row->jb, row->bb);
+    }
+    row->hi = i == 0 ? HUGE_VAL : 0.0;
+    row->mu = i == 0 ? 0.0 : mu;
+    row->normal = -1;
+    row->impulse = i == 0 ? 1e-3 * fabs(random_next()) : 0.0;
+    row->softness = 0.1;
+  }
+}
+
+/* A row that goes into no pack: a motor along one axis. */
+static void other_fill(hapi_row *row, uint32_t a)
+{
+  memset(row, 0, sizeof *row);
+  row->a = a;
+  row->single = 1;
+  row->ja[a % 3] = 1.0;
+  row->ba[a % 3] = mass[a];
+  row->lo = -0.01;
+  row->hi = 0.01;
+  row->normal = -1;
+  row->target = 0.1 * random_next();
+  row->softness = 1e-4;
+}
+
+static void problem_link(problem *p, const hapi_pack_work *work)
+{
+  p->solver.rows = p->rows;
+  p->solver.v = p->v;
+  p->solver.free = p->free_v;
+  p->solver.work = p->work;
+  p->solver.packs.work = work;
+  p->solver.packs.of = p->packs;
+  p->solver.packs.contacts = p->contacts;
+  p->solver.packs.impulse = p->impulse;
+  p->solver.packs.response = p->response;
+  p->solver.packs.packables = p->packables;
+  p->solver.packs.units = p->units;
+  p->solver.packs.order = p->order;
+  p->solver.packs.sorted = p->sorted;
+  p->solver.packs.loose = p->loose;
+  p->solver.packs.levels = p->levels;
+  p->solver.packs.colors = p->colors;
+}
+
+static void contacts_make(problem *p, double mu)
+{
+  uint32_t count = 0;
+  for (uint32_t pair = 0; pair < PAIRS; ++pair) {
+    double frame[3][3];
+    uint32_t a = 1 + pair % (BODIES - 1);
+    uint32_t b = pair % 2 == 0 ? 0 : 1 + (pair * 7 + 3) % (BODIES - 1);
+    b = b == a ? 0 : b;
+    random_frame(frame);
+    for (uint32_t i = 0; i < 1 + pair % PAIR_CONTACTS; ++i) {
+      contact_fill(&p->rows[count], a, b, frame, mu);
+      for (uint32_t k = 1; k < 3; ++k) {
+        p->rows[count + k].normal = (int32_t)count;
+      }
+      count += 3;
+    }
+    if (pair % 8 == 5) {
+      other_fill(&p->rows[count++], a);
+    }
+  }
+  p->solver.row_count = count;
+}
+
+static void problem_make(problem *p, uint64_t seed, double mu, uint32_t sweeps)
+{
+  memset(p, 0, sizeof *p);
+  state = seed;
+  for (uint32_t i = 0; i < BODIES; ++i) {
+    mass[i] = i == 0 ? 0.0 : i == 9 ? 0.0 : exp(random_next());
+    for (int k = 0; k < 6; ++k) {
+      p->v[i][k] = p->free_v[i][k] = i == 0 ? 0.0 : (k < 3 ? 0.1 : 1.0) * random_next();
+    }
+  }
+  contacts_make(p, mu);
+  p->solver.body_count = BODIES;
+  p->solver.tolerance = 1e-12;
+  p->solver.update_budget = UINT32_MAX;
+  p->solver.max_sweeps = sweeps;
+  p->solver.work_count = WORK;
+  p->solver.ready = true;
+  p->solver.packs.contact_capacity = PACKS;
+  p->solver.packs.body_capacity = BODIES;
+}
+
+typedef void (*contact_ready)(hapi_solver *solver, uint32_t first, uint32_t count, bool by_mass);
+typedef void (*row_ready)(hapi_solver *solver, uint32_t index);
+
+static void rows_ready(problem *p, contact_ready contact, row_ready other)
+{
+  for (uint32_t i = 0; i < p->solver.row_count;) {
+    bool triple = i + 1 < p->solver.row_count && p->rows[i + 1].normal == (int32_t)i;
+    if (triple) {
+      contact(&p->solver, i, 3, true);
+    } else {
+      other(&p->solver, i);
+    }
+    i += triple ? 3 : 1;
+  }
+}
+
+/* m/s, by how much the impulses miss what the rows ask for. */
+static double rows_miss(const problem *p)
+{
+  static double v[BODIES][6];
+  double most = 0.0;
+  memcpy(v, p->free_v, sizeof v);
+  for (uint32_t i = 0; i < p->solver.row_count; ++i) {
+    const hapi_row *row = &p->rows[i];
+    for (int k = 0; k < 6; ++k) {
+      v[row->a][k] += row->impulse * row->ba[k];
+      v[row->b][k] += row->impulse * row->bb[k];
+    }
+  }
+  for (uint32_t i = 0; i < p->solver.row_count; ++i) {
+    const hapi_row *row = &p->rows[i];
+    double load = row->normal < 0 ? 0.0 : p->rows[row->normal].impulse;
+    double hi = row->normal < 0 ? row->hi : row->mu * load;
+    double lo = row->normal < 0 ? row->lo : -hi;
+    double w = vector_dot(row->ja, v[row->a], 6) + vector_dot(row->jb, v[row->b], 6);
+    double over = w + row->softness * row->impulse - row->target;
+    if (vector_dot(row->ja, row->ba, 6) + vector_dot(row->jb, row->bb, 6) == 0.0) {
+      continue;
+    }
+    CHECK(row->impulse >= lo - 1e-15 && row->impulse <= hi + 1e-15);
+    double miss = row->impulse <= lo && lo == hi ? 0.0
+                  : row->impulse <= lo           ? fmax(-over, 0.0)
+                  : row->impulse >= hi           ? fmax(over, 0.0)
+                                                 : fabs(over);
+    most = fmax(most, miss);
+  }
+  return most;
+}
+
+TEST(impulses_are_what_the_rows_ask_for)
+{
+  for (uint64_t seed = 1; seed <= 8; ++seed) {
+    problem_make(&one, seed, 0.3, 20000);
+    problem_link(&one, hapi_pack_work_best());
+    rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+    hapi_solver_run(&one.solver);
+    CHECK(one.solver.packs.count > 0);
+    CHECK(one.solver.packs.loose_rows < one.solver.row_count / 4);
+    CHECK_SAY(rows_miss(&one) < 1e-10, "%g", rows_miss(&one));
+    CHECK(!one.solver.packs.in_use);
+  }
+}
+
+/* Without friction there is one answer: rows one by one find it, too. */
+TEST(rows_one_by_one_end_there_too)
+{
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    for (int packed = 0; packed < 2; ++packed) {
+      problem *p = packed ? &one : &two;
+      problem_make(p, seed, 0.0, 20000);
+      problem_link(p, packed ? hapi_pack_work_best() : NULL);
+      rows_ready(p, hapi_contact_ready, hapi_row_ready);
+      hapi_solver_run(&p->solver);
+    }
+    CHECK(one.solver.packs.count > 0 && two.solver.packs.count == 0);
+    for (uint32_t i = 0; i < BODIES; ++i) {
+      for (int k = 0; k < 6; ++k) {
+        CHECK_NEAR(one.v[i][k], two.v[i][k], 1e-9);
+      }
+    }
+  }
+}
+
+/* No impulse goes from one body to another one and comes out different. */
+TEST(momentum_is_handed_on)
+{
+  double before[3] = {0.0};
+  double after[3] = {0.0};
+  problem_make(&one, 3, 0.5, 12);
+  for (uint32_t i = 0; i < one.solver.row_count; ++i) { /* nothing is held */
+    one.rows[i].target = one.rows[i].single ? -100.0 : 0.0;
+    one.rows[i].impulse = 0.0;
+    one.rows[i].lo = one.rows[i].normal < 0 ? 0.0 : one.rows[i].lo;
+  }
+  problem_link(&one, hapi_pack_work_best());
+  rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+  hapi_solver_run(&one.solver);
+  CHECK(one.solver.packs.count > 0);
+  for (uint32_t i = 1; i < BODIES; ++i) {
+    for (int k = 0; k < 3 && mass[i] > 0.0; ++k) {
+      before[k] += one.free_v[i][k] / mass[i];
+      after[k] += one.v[i][k] / mass[i];
+    }
+  }
+  for (uint32_t i = 0; i < one.solver.row_count; ++i) { /* what 9 got, which does not move */
+    const hapi_row *row = &one.rows[i];
+    for (int k = 0; k < 3 && (row->a == 9 || row->b == 9); ++k) {
+      after[k] += row->impulse * (row->a == 9 ? row->ja[k] : row->jb[k]);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    CHECK_NEAR(after[k], before[k], 1e-12);
+  }
+}
+
+static void same_bits(void)
+{
+  CHECK(one.solver.packs.count > 0 && one.solver.packs.count == two.solver.packs.count);
+  CHECK(one.solver.sweeps == two.solver.sweeps && one.solver.sweeps > 2);
+  CHECK(memcmp(one.v, two.v, sizeof one.v) == 0);
+  CHECK(memcmp(&one.solver.residual, &two.solver.residual, sizeof(double)) == 0);
+  CHECK(memcmp(&one.solver.corrected, &two.solver.corrected, sizeof(double)) == 0);
+  for (uint32_t i = 0; i < one.solver.row_count; ++i) {
+    CHECK(memcmp(&one.rows[i].impulse, &two.rows[i].impulse, sizeof(double)) == 0);
+  }
+}
+
+TEST(pairs_and_plain_c_have_the_same_bits)
+{
+  for (uint64_t seed = 1; seed <= 6; ++seed) {
+    for (int plain = 0; plain < 2; ++plain) {
+      problem_make(&one, seed, 0.4, 40);
+      problem_make(&two, seed, 0.4, 40);
+      one.solver.direct_rows = two.solver.direct_rows = seed % 2 == 0 ? ROWS : 0;
+      problem_link(&one, hapi_pack_work_best());
+      problem_link(&two, plain ? &plain_hapi_pack_work_pairs : &hapi_pack_work_pairs);
+      rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+      rows_ready(&two, plain ? plain_hapi_contact_ready : hapi_contact_ready,
+                 plain ? plain_hapi_row_ready : hapi_row_ready);
+      hapi_solver_run(&one.solver);
+      (plain ? plain_hapi_solver_run : hapi_solver_run)(&two.solver);
+      same_bits();
+    }
+  }
+}
+
+static void next_tick(problem *p, bool made)
+{
+  memcpy(p->v, p->free_v, sizeof p->v);
+  for (uint32_t i = 0; i < p->solver.row_count;) {
+    bool triple = i + 1 < p->solver.row_count && p->rows[i + 1].normal == (int32_t)i;
+    p->rows[i].target += 1e-3 * (i % 5);
+    if (!triple) {
+      hapi_row_ready(&p->solver, i);
+    } else if (made || i % 4 == 0) {
+      hapi_contact_ready(&p->solver, i, 3, true);
+    } else {
+      hapi_contact_again(&p->solver, i, 3);
+    }
+    i += triple ? 3 : 1;
+  }
+}
+
+/* Some rows are made anew in each tick, others go on. */
+TEST(what_is_kept_is_what_would_be_made)
+{
+  problem_make(&one, 5, 0.4, 10);
+  problem_make(&two, 5, 0.4, 10);
+  problem_link(&one, hapi_pack_work_best());
+  problem_link(&two, hapi_pack_work_best());
+  rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+  rows_ready(&two, hapi_contact_ready, hapi_row_ready);
+  for (int tick = 0; tick < 5; ++tick) {
+    hapi_packs_forget(&two.solver.packs);
+    hapi_solver_run(&one.solver);
+    hapi_solver_run(&two.solver);
+    same_bits();
+    next_tick(&one, false);
+    next_tick(&two, false);
+  }
+}
+
+/* A contact that changes its bodies, or is another kind of row, takes its place with it. */
+TEST(packs_that_no_longer_hold_are_made_anew)
+{
+  for (int change = 0; change < 3; ++change) {
+    problem_make(&one, 7, 0.4, 10);
+    problem_make(&two, 7, 0.4, 10);
+    problem_link(&one, hapi_pack_work_best());
+    problem_link(&two, hapi_pack_work_best());
+    rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+    hapi_solver_run(&one.solver);
+    memcpy(two.rows, one.rows, sizeof one.rows);
+    two.solver.packs.made = one.solver.packs.made;
+    for (int i = 0; i < 2; ++i) {
+      problem *p = i == 0 ? &one : &two;
+      for (uint32_t k = 0; k < 3; ++k) {
+        p->rows[k].a = change == 0 ? 30 : p->rows[k].a;
+        p->rows[k].softness = change == 1 ? NAN : p->rows[k].softness;
+      }
+      p->solver.row_count -= change == 2 ? 3 : 0;
+      next_tick(p, true);
+      hapi_solver_run(&p->solver);
+    }
+    same_bits();
+  }
+}
+
+/* What finds no room in the packs is swept one by one. */
+TEST(without_room_rows_stay_loose)
+{
+  for (uint32_t room = 0; room < 40; room += 13) {
+    problem_make(&one, 9, 0.3, 20000);
+    problem_link(&one, hapi_pack_work_best());
+    one.solver.packs.contact_capacity = room;
+    rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+    hapi_solver_run(&one.solver);
+    CHECK(one.solver.packs.contact_count <= room);
+    CHECK((one.solver.packs.count > 0) == (room > 0));
+    CHECK_SAY(rows_miss(&one) < 1e-10, "%g", rows_miss(&one));
+  }
+}
+
+TEST(what_is_no_number_shows)
+{
+  problem_make(&one, 11, 0.3, 10);
+  problem_link(&one, hapi_pack_work_best());
+  one.v[5][2] = one.free_v[5][2] = NAN;
+  rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+  hapi_solver_run(&one.solver);
+  CHECK(one.solver.residual == HUGE_VAL);
+}
+
+/* Where a load has to go through many bodies, rows keep their order. */
+TEST(a_high_stack_is_in_no_pack)
+{
+  for (uint32_t height = 8; height <= 9; ++height) {
+    double frame[3][3];
+    problem_make(&one, 13, 0.3, 10);
+    random_frame(frame);
+    for (uint32_t i = 0; i < 2 * height; ++i) {
+      uint32_t level = i % height;
+      mass[9] = 1.0;
+      contact_fill(&one.rows[3 * i], 1 + level, level, frame, 0.3);
+      one.rows[3 * i + 1].normal = one.rows[3 * i + 2].normal = (int32_t)(3 * i);
+    }
+    one.solver.row_count = 6 * height;
+    problem_link(&one, hapi_pack_work_best());
+    one.solver.packs.contact_capacity = PACKS;
+    rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+    hapi_solver_run(&one.solver);
+    CHECK((one.solver.packs.count > 0) == (height == 8));
+  }
+}
