@@ -17,7 +17,7 @@
 
 #define TICKS 1500
 #define SPEED 0.1003 /* m/s, of the hand: no cube is reached just at a tick */
-#define EDGE 0.1  /* m */
+#define EDGE 0.1     /* m */
 #define RADIUS 0.01
 #define A_TICK \
   5e-3 /* what a cube that is hit a tick earlier changes, and a window may begin after it */

@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "solver/contact_solver.h"
+#include "solver/pack_choice.h"
 
 #define BODIES 40u
 #define PAIRS 90u

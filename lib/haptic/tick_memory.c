@@ -7,6 +7,7 @@
 #include "base/alloc.h"
 #include "base/assert.h"
 #include "local/grab_rows.h"
+#include "solver/pack_choice.h"
 
 #define ROWS_PER_CONTACT 3u
 #define ROWS_PER_POINTER_CONTACT 4u /* with friction of a soft finger */

@@ -1,6 +1,6 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "solver/packs.h"
+#include "solver/pack_choice.h"
 
 const hapi_pack_work *hapi_pack_work_best(void)
 {

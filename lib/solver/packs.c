@@ -12,8 +12,8 @@
 #define COLORS 64u
 #define LOOSE_COLOR 64u /* of a pair beyond all colors */
 /* Levels of a stack that packs are for. One of 30 under a hand gains energy by many sweeps in the
- * order of packs, and not by those of few rows and a direct solve; one of 20 does not. The reason is
- * not known. */
+ * order of packs, and not by few sweeps and a direct solve; one of 20 does not. The reason is not
+ * known. */
 #define HEIGHT_MOST 8u
 #define COUNT_MOST 15u /* contacts of a pair that the order tells apart */
 

@@ -113,8 +113,6 @@ typedef struct hapi_packs {
 
 extern const hapi_pack_work hapi_pack_work_pairs;       /* on every processor */
 extern const hapi_pack_work *const hapi_pack_work_avx2; /* NULL: not built */
-/* What this processor does best. Not on the tick: it asks the processor. */
-const hapi_pack_work *hapi_pack_work_best(void);
 
 /* The packs of these rows, with their impulses; those of the last call stay where they hold.
  * False: nothing is packed. */
