@@ -7,6 +7,7 @@
 
 #include "wire/kinds.h"
 
+/* NOLINTBEGIN(bugprone-macro-parentheses): types and members */
 #define MEMBER(of, member, elements, type, bits)                                   \
   {                                                                                \
 #member, offsetof(of, member), sizeof(((of *)0)->member), elements, type, bits \
@@ -59,5 +60,6 @@
 #define AXIS(of, member)                                                                \
   SINGLE(of, member.direction, 3), NUMBER(of, member.carrier), FLAG(of, member.slides), \
       EXACT(of, member.position, 1)
+/* NOLINTEND(bugprone-macro-parentheses) */
 
 #endif

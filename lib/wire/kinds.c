@@ -140,7 +140,7 @@ static const hapi_wire_field feel_fields[] = {
     F(OPEN, feel.mu_static, 1), F(EXACT, feel.stiffness, 1), F(EXACT, feel.damping, 1),
     F(EXACT, feel.impact.force, 1), F(EXACT, feel.impact.decay, 1), F(EXACT, feel.impact.hz, 1),
     F(EXACT, feel.adhesion, 1), F(EXACT, feel.magnet_force, 1), F(EXACT, feel.magnet_reach, 1),
-    /* Textures are refused. */
+    /* Textures are refused. NOLINTNEXTLINE(bugprone-sizeof-expression): geom is a handle */
     F(NOT, feel.texture_number), F(NOT, feel.texture), F(NOT, feel.geom)};
 
 static const hapi_wire_field placed_fields[] = {
