@@ -126,7 +126,7 @@ static map_result map_run(const map_point *at)
 static const hap_force_kind map_kinds[] = {HAP_FORCE_SPRING, HAP_FORCE_MAGNET, HAP_FORCE_DETENTS,
                                            HAP_FORCE_VISCOUS};
 
-static int less(const void *a, const void *b)
+static int compare_doubles(const void *a, const void *b)
 {
   double x = *(const double *)a;
   double y = *(const double *)b;
@@ -148,7 +148,7 @@ static map_result map_run_rattling(map_point at)
     out.faults += run.faults;
     last[i] = run.last;
   }
-  qsort(last, 5, sizeof last[0], less);
+  qsort(last, 5, sizeof last[0], compare_doubles);
   out.last = last[2];
   return out;
 }

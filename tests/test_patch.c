@@ -451,6 +451,31 @@ static double hull_area(const polygon *p)
   return area;
 }
 
+/* Edges over edges cross half way where one box is turned a little, as in a row or a stack that was
+ * pushed: that crossing is no corner, and a box without one of its corners tips. */
+TEST(boxes_edge_over_edge_keep_the_corners_of_their_overlap)
+{
+  uint64_t state = 5;
+  double least = 1.0;
+  for (int i = 0; i < 5000; ++i) {
+    double slid = random_in(&state, 0.0, 0.08);
+    double tiny = pow(10.0, random_in(&state, -9.0, -5.0));
+    thing low = thing_simple(HAPI_SHAPE_BOX, 0.0, 0.0, 0.0);
+    thing high = thing_simple(HAPI_SHAPE_BOX, slid, random_in(&state, -1e-6, 1e-6), 0.2 - 1e-4);
+    hapi_patch patch;
+    polygon spanned = {0};
+    thing_turn(&high, along_z, random_in(&state, -10.0, 10.0) * tiny);
+    thing_turn(&high, along_x, random_in(&state, -1.0, 1.0) * tiny);
+    thing_turn(&high, along_y, random_in(&state, -1.0, 1.0) * tiny);
+    REQUIRE(patch_find(&high, &low, margin, &patch));
+    for (; spanned.count < patch.count; ++spanned.count) {
+      memcpy(spanned.at[spanned.count], patch.points[spanned.count].core_b, sizeof spanned.at[0]);
+    }
+    least = fmin(least, hull_area(&spanned) / ((0.1 - slid) * 0.12));
+  }
+  CHECK_SAY(least > 0.99, "%g of the overlap", least);
+}
+
 /* Area of an overlap by counting the points of a grid over the first polygon's box. */
 static double overlap_area(const polygon *p, const polygon *q, double reach)
 {

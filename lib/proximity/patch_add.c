@@ -102,6 +102,28 @@ static void spot_choose(hapi_spot *spots, int place, int count, double slack)
   spots[best] = kept;
 }
 
+/* Of spots as deep as the first one, the one farthest from the middle of all takes its place: where
+ * edges of two faces lie over each other they may cross half way, and such a crossing would take a
+ * corner's place. What is about as far keeps its order. */
+static void spot_prefer_corner(hapi_spot *spots, int count, double near, double size)
+{
+  int best = 0;
+  hapi_spot middle = {.x = 0.0};
+  for (int i = 0; i < count; ++i) {
+    middle.x += spots[i].x / count;
+    middle.y += spots[i].y / count;
+  }
+  for (int i = 1; i < count; ++i) {
+    double farther = spot_distance2(&middle, &spots[i]) - spot_distance2(&middle, &spots[best]);
+    if (spots[i].gap <= spots[0].gap + near && farther > 1e-3 * size * size) {
+      best = i;
+    }
+  }
+  hapi_spot first = spots[0];
+  spots[0] = spots[best];
+  spots[best] = first;
+}
+
 int hapi_patch_reduce(hapi_spot *spots, int count, double size)
 {
   HAPI_ASSERT(count >= 0 && count <= HAPI_SPOTS_MAX && size >= 0.0);
@@ -113,6 +135,7 @@ int hapi_patch_reduce(hapi_spot *spots, int count, double size)
   if (count <= HAPI_PATCH_POINTS) {
     return count;
   }
+  spot_prefer_corner(spots, count, near, size);
   for (int place = 1; place < HAPI_PATCH_POINTS; ++place) {
     spot_choose(spots, place, count, near * near);
   }
