@@ -42,7 +42,8 @@ static void storm_check(const storm_def *def, storm_result *out)
   storm_say(out);
   CHECK(out->bad == 0 && out->unreleased == 0);
   CHECK(out->peak <= STORM_FORCE * (1.0 + 1e-9) && out->steepest <= STORM_SLEW * (1.0 + 1e-9));
-  CHECK(out->unexpected == 0 && out->faults == 0);
+  CHECK_SAY(out->unexpected == 0 && out->faults == 0, "%llu unexpected results, %llu faults",
+            (unsigned long long)out->unexpected, (unsigned long long)out->faults);
   CHECK(out->posts_run == out->posts_taken); /* nothing lost */
   CHECK(out->edits > 0 && out->writes > 0 && out->stats.loop.contact_ticks > 0);
   CHECK(out->stats.faults.states_rejected == 0);

@@ -60,8 +60,9 @@ typedef struct hapi_patch {
 /* The points whose gap is at most margin [m]. The margin acts along the normal only. The points of
  * two faces lie in the overlap seen along the normal; boxes or hulls that pass each other edge
  * beside edge, without an overlap, have no points until they touch. Of more than four points the
- * deepest and those that span the largest area are kept. Faces within 5 degrees of the nearest
- * direction make a patch of faces, so a slight tilt leaves all its corners.
+ * deepest and those that span the largest area with it are kept; of several deepest ones, that with
+ * which the area is largest. Faces within 5 degrees of the nearest direction make a patch of faces,
+ * so a slight tilt leaves all its corners.
  *
  * Errors as in hapi_nearest_points; face normals are exact. False, with count 0: there is no answer
  * (see there). */

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include <math.h>
 #include <stdbool.h>
+#include <string.h>
 
 #include "base/assert.h"
 #include "base/vec.h"
@@ -102,26 +103,47 @@ static void spot_choose(hapi_spot *spots, int place, int count, double slack)
   spots[best] = kept;
 }
 
-/* Of spots as deep as the first one, the one farthest from the middle of all takes its place: where
- * edges of two faces lie over each other they may cross half way, and such a crossing would take a
- * corner's place. What is about as far keeps its order. */
-static void spot_prefer_corner(hapi_spot *spots, int count, double near, double size)
+/* Twice the area that four spots span, in the order in which they were chosen. */
+static double area_spanned(const hapi_spot *s)
 {
-  int best = 0;
-  hapi_spot middle = {.x = 0.0};
-  for (int i = 0; i < count; ++i) {
-    middle.x += spots[i].x / count;
-    middle.y += spots[i].y / count;
+  return fabs(triangle_area(&s[0], &s[1], &s[2])) + fmax(0.0, area_added(s, &s[3]));
+}
+
+/* Four of more, the first one being given; the area that they span. */
+static double spots_choose(hapi_spot *spots, int count, double near)
+{
+  for (int place = 1; place < HAPI_PATCH_POINTS; ++place) {
+    spot_choose(spots, place, count, near * near);
   }
+  return area_spanned(spots);
+}
+
+/* Part of an area; another choice that spans less than so much more is no better. */
+static const double wider = 0.05;
+
+/* Where edges of two faces lie over each other they cross half way. That crossing is as deep as the
+ * corners on both sides, and would take the place of one of them: so each of the deepest spots is
+ * tried as the first one. */
+static void spots_choose_widest(hapi_spot *spots, int count, double near)
+{
+  hapi_spot first[HAPI_SPOTS_MAX];
+  double deepest = spots[0].gap + near;
+  memcpy(first, spots, (size_t)count * sizeof *first);
+  double area = spots_choose(spots, count, near);
   for (int i = 1; i < count; ++i) {
-    double farther = spot_distance2(&middle, &spots[i]) - spot_distance2(&middle, &spots[best]);
-    if (spots[i].gap <= spots[0].gap + near && farther > 1e-3 * size * size) {
-      best = i;
+    hapi_spot tried[HAPI_SPOTS_MAX];
+    if (first[i].gap > deepest) {
+      continue;
+    }
+    memcpy(tried, first, (size_t)count * sizeof *tried);
+    tried[0] = first[i];
+    tried[i] = first[0];
+    double spanned = spots_choose(tried, count, near);
+    if (spanned > (1.0 + wider) * area) {
+      area = spanned;
+      memcpy(spots, tried, HAPI_PATCH_POINTS * sizeof *tried);
     }
   }
-  hapi_spot first = spots[0];
-  spots[0] = spots[best];
-  spots[best] = first;
 }
 
 int hapi_patch_reduce(hapi_spot *spots, int count, double size)
@@ -135,10 +157,7 @@ int hapi_patch_reduce(hapi_spot *spots, int count, double size)
   if (count <= HAPI_PATCH_POINTS) {
     return count;
   }
-  spot_prefer_corner(spots, count, near, size);
-  for (int place = 1; place < HAPI_PATCH_POINTS; ++place) {
-    spot_choose(spots, place, count, near * near);
-  }
+  spots_choose_widest(spots, count, near);
   return HAPI_PATCH_POINTS;
 }
 
