@@ -62,7 +62,7 @@ static const program programs[] = {
      "a device that swings by itself or runs away: when the guard acts, and where it must not"},
     {"peers", bench_peers,
      "the same worlds and hand in engines that are stepped at 1 kHz: time, force; --scene "
-     "WORLD[:N][@HZ]"},
+     "WORLD[:N][@HZ]; --only engine=NAME/NAME,...: of such rows alone"},
     {"poses", bench_poses,
      "what is drawn at 90 Hz against where the loop had hand and bodies; cost of a call"},
     {"remote", bench_remote,
@@ -206,7 +206,7 @@ static bool options_fit(const program *p, const bench *b)
     wrong = "has no couplings to choose from: --coupling is for accuracy and impedance";
   } else if (b->coupling != NULL && !bench_find_coupling(b->coupling, &coupling)) {
     wrong = "takes --coupling proxy, god-object or virtual";
-  } else if (b->only != NULL && p->run != bench_stability) {
+  } else if (b->only != NULL && p->run != bench_stability && p->run != bench_peers) {
     wrong = "has no points to choose from";
   } else if (b->estimates != NULL && p->run != bench_accuracy) {
     wrong = "has no estimates to choose from: --estimates is for accuracy";

@@ -10,7 +10,10 @@
 #include <string.h>
 
 #include "bench/peers_run.h"
+#include "bench/points.h"
 #include "bench/progress.h"
+
+#include "base/log.h"
 
 #define PEERS_COLUMNS                                                           \
   "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode" \
@@ -31,6 +34,7 @@
 #define SIZES_MOST 8
 #define ROWS_MOST 256
 #define ONE_PANEL "1,1"
+#define PEERS_KEYS "engine, world, bodies, physics_hz, haptic_hz"
 #define ALL_PANELS "2,4" /* rows, columns: one of each world */
 
 typedef struct world_plan {
@@ -304,6 +308,27 @@ static double case_cost(const peers_case *of)
   return 10.0 + of->bodies * of->haptic_hz / USUAL_HZ;
 }
 
+/* Whether --only takes the row; else why not is said. */
+static hap_status contestant_joins(bench *b, const contestant *who, const peers_case *of,
+                                   bool *out_joins)
+{
+  const point_field fields[] = {
+      {"engine", contestant_name(who), 0.0},
+      {"world", of->world, 0.0},
+      {"bodies", NULL, of->bodies},
+      {"physics_hz", NULL, who->engine != NULL ? of->haptic_hz : who->physics_hz},
+      {"haptic_hz", NULL, of->haptic_hz},
+  };
+  HAPI_TRY(points_filter(b, fields, BENCH_COUNT(fields), PEERS_KEYS, out_joins));
+  if (*out_joins && !contestant_takes(who, of)) {
+    bench_say("%s:%d@%g without %s, which %s", of->world, of->bodies, of->haptic_hz,
+              contestant_name(who),
+              world_sleeps(of->world) ? "does not sleep" : "would take too long");
+    *out_joins = false;
+  }
+  return HAP_OK;
+}
+
 static hap_status case_run(peers_bed *bed, FILE *csv, const peers_case *of)
 {
   bench *b = bed->bench;
@@ -314,21 +339,22 @@ static hap_status case_run(peers_bed *bed, FILE *csv, const peers_case *of)
   if (!peer_world_create(of->world, of->bodies, &world)) {
     return bench_fail(b, HAP_ERROR_ARGUMENT, "no world %s of %d boxes", of->world, of->bodies);
   }
-  for (size_t i = 0; i < bed->who_count; ++i) {
-    if (contestant_takes(&bed->who[i], of)) {
+  hap_status status = HAP_OK;
+  for (size_t i = 0; i < bed->who_count && status >= HAP_OK; ++i) {
+    bool joins = false;
+    status = contestant_joins(b, &bed->who[i], of, &joins);
+    if (joins) {
       rows[count++] = (peers_row){.who = &bed->who[i], .of = *of};
-    } else {
-      bench_say("%s:%d@%g without %s, which %s", of->world, of->bodies, of->haptic_hz,
-                contestant_name(&bed->who[i]),
-                world_sleeps(of->world) ? "does not sleep" : "would take too long");
     }
   }
   if (world_sleeps(of->world)) {
     world.hand.settle_s = SLEEP_SETTLE_S;
   }
   bed->row_count += count;
-  hap_status status = case_time(b, &world, rows, count);
   if (status >= HAP_OK) {
+    status = case_time(b, &world, rows, count);
+  }
+  if (status >= HAP_OK && count > 0) {
     status = truth_run(b, &peer_ode, of, &ode_truth);
   }
   for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
@@ -413,7 +439,11 @@ static void costs_panel(FILE *script, const peers_bed *bed, size_t plan)
 
 static bool plan_was_run(const peers_bed *bed, size_t plan)
 {
-  return costs_count(bed, 0, plan) > 0;
+  size_t count = 0;
+  for (size_t who = 0; who < bed->who_count; ++who) {
+    count += costs_count(bed, who, plan);
+  }
+  return count > 0;
 }
 
 static void costs_draw(FILE *script, const void *data)
@@ -588,6 +618,9 @@ hap_status bench_peers(bench *b)
   FILE *csv = bench_csv_open(b, "peers", PEERS_COLUMNS);
   hap_status status = csv != NULL ? worlds_run(bed, csv) : HAP_ERROR_IO;
   status = bench_csv_close(b, csv, status);
+  if (status >= HAP_OK && bed->row_count == 0) {
+    status = bench_fail(b, HAP_ERROR_NOT_FOUND, "--only %s: there is no such row", b->only);
+  }
   if (status >= HAP_OK && b->scene != NULL) {
     status = forces_write(bed);
   }
