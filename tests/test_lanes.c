@@ -165,6 +165,19 @@ TEST(contacts_one_by_one)
   }
 }
 
+/* What the solver still owes to v. */
+static void triples_push(problem *p)
+{
+  for (uint32_t i = 0; i < 3 * CONTACTS; i += 3) {
+    for (uint32_t k = i; p->rows[i].triple && k < i + 3; ++k) {
+      hapi_madd6(p->v[p->rows[k].a], p->rows[k].impulse, p->rows[k].ba);
+      if (p->rows[k].paired) {
+        hapi_madd6(p->v[p->rows[k].b], p->rows[k].impulse, p->rows[k].bb);
+      }
+    }
+  }
+}
+
 /* All rows of a contact at once are what they are one by one. */
 TEST(contact_as_rows)
 {
@@ -181,9 +194,11 @@ TEST(contact_as_rows)
       CHECK_NEAR(wide.rows[i].drive, plain.rows[i].drive, 0.0);
       CHECK(wide.rows[i].triple == plain.rows[i].triple);
     }
+    CHECK(wide.solver.owes && !plain.solver.owes);
+    triples_push(&wide);
     for (uint32_t i = 0; i < BODIES; ++i) {
       for (int k = 0; k < 6; ++k) {
-        CHECK_NEAR(wide.v[i][k], plain.v[i][k], 0.0);
+        CHECK_NEAR(wide.v[i][k], plain.v[i][k], 1e-12);
       }
     }
   }

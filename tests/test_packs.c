@@ -355,15 +355,24 @@ TEST(pairs_and_plain_c_have_the_same_bits)
   }
 }
 
-static void next_tick(problem *p, bool made)
+enum {
+  ALL_GO_ON,
+  SOME_GO_ON,
+  ALL_ARE_MADE
+};
+
+static void next_tick(problem *p, int what)
 {
+  uint32_t count = p->solver.row_count;
   memcpy(p->v, p->free_v, sizeof p->v);
-  for (uint32_t i = 0; i < p->solver.row_count;) {
+  hapi_solver_clear(&p->solver);
+  p->solver.row_count = count;
+  for (uint32_t i = 0; i < count;) {
     bool triple = i + 1 < p->solver.row_count && p->rows[i + 1].normal == (int32_t)i;
     p->rows[i].target += 1e-3 * (i % 5);
     if (!triple) {
       hapi_row_ready(&p->solver, i);
-    } else if (made || i % 4 == 0) {
+    } else if (what == ALL_ARE_MADE || (what == SOME_GO_ON && i % 4 == 0)) {
       hapi_contact_ready(&p->solver, i, 3, true);
     } else {
       hapi_contact_again(&p->solver, i, 3);
@@ -372,22 +381,68 @@ static void next_tick(problem *p, bool made)
   }
 }
 
-/* Some rows are made anew in each tick, others go on. */
+/* Some rows, or none, are made anew in each tick, others go on. */
 TEST(what_is_kept_is_what_would_be_made)
 {
-  problem_make(&one, 5, 0.4, 10);
-  problem_make(&two, 5, 0.4, 10);
-  problem_link(&one, hapi_pack_work_best());
-  problem_link(&two, hapi_pack_work_best());
-  rows_ready(&one, hapi_contact_ready, hapi_row_ready);
-  rows_ready(&two, hapi_contact_ready, hapi_row_ready);
-  for (int tick = 0; tick < 5; ++tick) {
+  for (int what = ALL_GO_ON; what <= SOME_GO_ON; ++what) {
+    problem_make(&one, 5, 0.4, 10);
+    problem_make(&two, 5, 0.4, 10);
+    problem_link(&one, hapi_pack_work_best());
+    problem_link(&two, hapi_pack_work_best());
+    rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+    rows_ready(&two, hapi_contact_ready, hapi_row_ready);
+    for (int tick = 0; tick < 5; ++tick) {
+      hapi_packs_forget(&two.solver.packs);
+      hapi_solver_run(&one.solver);
+      hapi_solver_run(&two.solver);
+      same_bits();
+      next_tick(&one, what);
+      next_tick(&two, what);
+    }
+  }
+}
+
+static void rows_become_others(problem *p, uint32_t first)
+{
+  for (uint32_t i = first; i < p->solver.row_count; ++i) {
+    p->rows[i].normal = -1;
+    p->rows[i].lo = -1.0;
+    p->rows[i].hi = 1.0;
+  }
+}
+
+static uint32_t last_contact(const problem *p)
+{
+  uint32_t i = p->solver.row_count - 3;
+  while (p->rows[i + 1].normal != (int32_t)i || p->rows[i + 2].normal != (int32_t)i) {
+    --i;
+  }
+  return i;
+}
+
+/* One that goes while the others stay where they are; without and with other rows in its place. */
+TEST(a_contact_that_goes_is_in_no_pack)
+{
+  for (int others = 0; others < 2; ++others) {
+    problem_make(&one, 8, 0.4, 10);
+    problem_make(&two, 8, 0.4, 10);
+    problem_link(&one, hapi_pack_work_best());
+    problem_link(&two, hapi_pack_work_best());
+    for (int i = 0; i < 2; ++i) {
+      problem *p = i == 0 ? &one : &two;
+      rows_ready(p, hapi_contact_ready, hapi_row_ready);
+      hapi_solver_run(&p->solver);
+      next_tick(p, ALL_GO_ON);
+      hapi_solver_run(&p->solver);
+      uint32_t last = last_contact(p);
+      p->solver.row_count = others ? last + 3 : last;
+      rows_become_others(p, last);
+      next_tick(p, ALL_GO_ON);
+    }
     hapi_packs_forget(&two.solver.packs);
     hapi_solver_run(&one.solver);
     hapi_solver_run(&two.solver);
     same_bits();
-    next_tick(&one, false);
-    next_tick(&two, false);
   }
 }
 
@@ -410,7 +465,7 @@ TEST(packs_that_no_longer_hold_are_made_anew)
         p->rows[k].softness = change == 1 ? NAN : p->rows[k].softness;
       }
       p->solver.row_count -= change == 2 ? 3 : 0;
-      next_tick(p, true);
+      next_tick(p, ALL_ARE_MADE);
       hapi_solver_run(&p->solver);
     }
     same_bits();

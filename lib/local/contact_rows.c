@@ -153,6 +153,7 @@ static void begin_rows(hapi_rows *rows, const placed_contact *c, const hapi_cont
     rows->sources[first + i] = source;
     rows->sources[first + i].part = parts[i];
   }
+  rows->sources[first].count = (uint8_t)count;
 }
 
 /* m/s along the normal before the tick; negative: they come nearer. */
@@ -420,15 +421,13 @@ static bool impulses_finite(const hapi_row *row, uint32_t count)
 }
 
 /* Whether the rows of the tick before are where they stood. Rows of this tick so far may have been
- * written over them, also such as were taken back: a stop of a joint that is too far away. */
+ * written over them, also such as were taken back: a stop of a joint that is too far away. Then the
+ * first one is among those. */
 static bool rows_stand(const hapi_rows *rows, const hapi_contact_kept *kept, uint32_t index)
 {
   const hapi_row_source *source = &rows->sources[kept->first];
-  bool own = kept->first >= rows->solver.row_count;
-  for (uint32_t i = 0; i < kept->count && own; ++i) {
-    own = source[i].contact == index && !source[i].joint && !source[i].pointer;
-  }
-  return own;
+  return kept->first >= rows->solver.row_count && source->contact == index && !source->joint &&
+         !source->pointer && source->count == kept->count;
 }
 
 /* The rows of the tick before again, at the place that comes next; false: they have to be made. */
@@ -457,6 +456,7 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
       row->normal = row->normal < 0 ? -1 : (int32_t)first;
     }
     kept->first = first;
+    hapi_contact_moved(solver);
   }
   rows->sources[first].pushes_out = false;
   set_normal(facts, c, &solver->rows[first], &rows->sources[first], sample);

@@ -25,6 +25,7 @@ typedef struct hapi_row_source {
                       the velocity */
   bool gives;      /* may do work on bodies of the loop: a partner that the loop does not own, a
                       surface that moves, a spring */
+  uint8_t count;   /* of the first row of a contact: its rows */
   double stays;    /* m/s, of a row that pushes out: its target without that */
 } hapi_row_source;
 

@@ -97,12 +97,17 @@ static void join_triple(hapi_solver *solver, uint32_t last)
   }
 }
 
-static void warm_start(hapi_solver *solver, hapi_row *row)
+static void impulse_bound(const hapi_solver *solver, hapi_row *row)
 {
   double lo;
   double hi;
   hapi_row_bounds(solver->rows, row, &lo, &hi);
   row->impulse = hapi_clamp(row->impulse, lo, hi);
+}
+
+static void warm_start(hapi_solver *solver, hapi_row *row)
+{
+  impulse_bound(solver, row);
   if (row->impulse == 0.0) {
     return;
   }
@@ -152,12 +157,16 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, boo
     bool packable = by_mass && hapi_row_moves_a(r) && r[0].lo == 0.0 && r[0].hi == HUGE_VAL &&
                     r[1].mu + r[2].mu < HUGE_VAL;
     r->triple = r->triple && packable ? HAPI_TRIPLE_BY_MASS : r->triple;
+    solver->packs.ready += r->triple == HAPI_TRIPLE_BY_MASS;
   }
   for (uint32_t i = 0; i < count; ++i) {
-    if (r[i].inverse != 0.0) {
+    if (r->triple) {
+      impulse_bound(solver, &r[i]);
+    } else if (r[i].inverse != 0.0) {
       warm_start(solver, &r[i]);
     }
   }
+  solver->owes = solver->owes || r->triple;
 }
 
 /* ---- sweeps ---- */
@@ -251,14 +260,9 @@ static void update_triple(hapi_solver *solver, hapi_row *r, hapi_corrections *io
 }
 
 /* As three warm starts, but the velocities are read and written once. */
-static void warm_triple(hapi_solver *solver, hapi_row *r)
+static void triple_start(hapi_solver *solver, const hapi_row *r)
 {
-  double d[3];
-  d[0] = r[0].impulse = hapi_clamp(r[0].impulse, r[0].lo, r[0].hi);
-  for (int i = 1; i < 3; ++i) {
-    double most = hapi_friction_most(&r[i], hapi_row_load(&r[0]));
-    d[i] = r[i].impulse = hapi_clamp(r[i].impulse, -most, most);
-  }
+  double d[3] = {r[0].impulse, r[1].impulse, r[2].impulse};
   if (d[0] == 0.0 && d[1] == 0.0 && d[2] == 0.0) {
     return;
   }
@@ -268,16 +272,37 @@ static void warm_triple(hapi_solver *solver, hapi_row *r)
   }
 }
 
+/* The impulses of triples to v: of packs all at once. */
+static void triples_start(hapi_solver *solver)
+{
+  if (solver->packs.in_use) {
+    solver->packs.work->push(&solver->packs, solver->v);
+  }
+  for (uint32_t i = 0; i < loose_count(solver); ++i) {
+    hapi_loose_rows at = loose_at(solver, i);
+    for (uint32_t k = at.first; k < at.end; k += solver->rows[k].triple ? 3 : 1) {
+      if (solver->rows[k].triple) {
+        triple_start(solver, &solver->rows[k]);
+      }
+    }
+  }
+  solver->owes = false;
+}
+
 void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count)
 {
   hapi_row *r = &solver->rows[first];
+  bool moved = !r->paired && !r->single; /* by a partner that does not respond */
   for (uint32_t i = 0; i < count; ++i) {
     HAPI_ASSERT(r[i].inverse != 0.0 && r[i].a < solver->body_count);
-    bool moved = !r[i].paired && !r[i].single; /* by a partner that does not respond */
-    r[i].drive = r[i].target - (moved ? hapi_dot6(r[i].jb, solver->v[r[i].b]) : 0.0);
+    r[i].drive = r[i].target;
+    if (moved) {
+      r[i].drive -= hapi_dot6(r[i].jb, solver->v[r[i].b]);
+    }
   }
   if (r->triple) {
-    warm_triple(solver, r);
+    solver->packs.ready += r->triple == HAPI_TRIPLE_BY_MASS;
+    solver->owes = true;
     return;
   }
   for (uint32_t i = 0; i < count; ++i) {
@@ -707,6 +732,9 @@ void hapi_solver_run(hapi_solver *solver)
     return;
   }
   solver->packs.in_use = hapi_packs_begin(&solver->packs, solver->rows, rows, solver->body_count);
+  if (solver->owes) {
+    triples_start(solver);
+  }
   bool ahead = way_place(solver, &way);
   uint32_t cost = sweep_cost(solver);
   uint32_t direct_from = solver->packs.in_use ? PACKED_SWEEPS : 2; /* sweeps */

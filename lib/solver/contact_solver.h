@@ -53,6 +53,7 @@ typedef struct hapi_solver {
 
   bool ready; /* in: every row is (hapi_row_ready), or the rows are those of the last run, with
                          its impulses in v, but for hapi_row_retarget */
+  bool owes;  /* in: impulses of triples are not in v yet */
   bool apart; /* in: all rows are single, and no two have a body in common: one sweep solves them */
   hapi_direct_rest rest;  /* inner */
   bool too_dear;          /* inner: an island was too large or too dear for the budget */
@@ -87,6 +88,14 @@ void hapi_solver_run(hapi_solver *solver);
  * has ended well. */
 void hapi_solver_calm(hapi_solver *solver);
 
+/* No rows; the next ones are made or made ready again one after the other. */
+static inline void hapi_solver_clear(hapi_solver *solver)
+{
+  solver->row_count = 0;
+  solver->packs.ready = 0;
+  solver->owes = false;
+}
+
 /* Prepares a row and adds its warm start to v. Where rows are made one by one this is done best as
  * soon as one is filled in, while it is at hand: there are more of them than fit into a near cache.
  * In their order; v, row_count and body_count are set before. */
@@ -103,6 +112,12 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, boo
 /* The same of rows that were ready in the last run, all of use, with the impulses of that run and
  * with another target. */
 void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count);
+
+/* [haptic] Rows of the last run are in another place than there. */
+static inline void hapi_contact_moved(hapi_solver *solver)
+{
+  ++solver->packs.made;
+}
 
 /* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */
 

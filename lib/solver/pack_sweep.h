@@ -64,7 +64,17 @@ static inline hapi_four cut_friction(hapi_four wanted, hapi_four most, hapi_four
   return hapi_four_min(hapi_four_max(wanted, hapi_four_sub(least, old)), hapi_four_sub(most, old));
 }
 
-/* v += M^-1 J^T d, of all three rows. sum: of the linear impulses. */
+/* Of the linear impulses of all three rows. */
+static inline void lanes_sum(const hapi_pack_contact *c, const hapi_four d[3], hapi_four out[3])
+{
+  for (int k = 0; k < 3; ++k) {
+    out[k] = hapi_four_mul(d[0], hapi_four_load(c->direction[0][k]));
+    out[k] = hapi_four_madd(out[k], d[1], hapi_four_load(c->direction[1][k]));
+    out[k] = hapi_four_madd(out[k], d[2], hapi_four_load(c->direction[2][k]));
+  }
+}
+
+/* v += M^-1 J^T d, of all three rows. sum: lanes_sum. */
 static inline void twist_push(lanes_twist *io, const double (*spin)[3][HAPI_LANES],
                               const hapi_four d[3], const hapi_four sum[3], hapi_four mass)
 {
@@ -102,11 +112,7 @@ static inline void contact_sweep(const hapi_pack_contact *c, double (*impulse)[H
   e[2] = hapi_four_sub(e[2], hapi_four_mul(hapi_four_load(c->coupling[2]), d[1]));
   most = hapi_four_mul(hapi_four_load(c->mu[1]), p[0]);
   d[2] = cut_friction(hapi_four_mul(e[2], hapi_four_load(c->inverse[2])), most, &p[2]);
-  for (int k = 0; k < 3; ++k) {
-    sum[k] = hapi_four_mul(d[0], hapi_four_load(c->direction[0][k]));
-    sum[k] = hapi_four_madd(sum[k], d[1], hapi_four_load(c->direction[1][k]));
-    sum[k] = hapi_four_madd(sum[k], d[2], hapi_four_load(c->direction[2][k]));
-  }
+  lanes_sum(c, d, sum);
   twist_push(&pair->a, c->spin_a, d, sum, pair->mass_a);
   if (paired) {
     twist_push(&pair->b, c->spin_b, d, sum, pair->less_b);
@@ -130,6 +136,47 @@ static inline void twist_scatter(const lanes_twist *in, const uint32_t bodies[HA
 {
   double *const rows[HAPI_LANES] = {v[bodies[0]], v[bodies[1]], v[bodies[2]], v[bodies[3]]};
   hapi_four_scatter(in->of, rows);
+}
+
+static inline void pack_push(const hapi_packs *packs, const hapi_pack *pack, double (*v)[6],
+                             bool paired)
+{
+  lanes_pair at;
+  at.mass_a = hapi_four_load(pack->mass_a);
+  at.less_b = hapi_four_sub(hapi_four_all(0.0), hapi_four_load(pack->mass_b));
+  twist_gather(v, pack->a, &at.a);
+  if (paired) {
+    twist_gather(v, pack->b, &at.b);
+  }
+  for (uint32_t i = pack->first; i < pack->first + pack->count; ++i) {
+    const hapi_pack_contact *c = &packs->contacts[i];
+    hapi_four p[3];
+    hapi_four sum[3];
+    for (int k = 0; k < 3; ++k) {
+      p[k] = hapi_four_load(packs->impulse[i][k]);
+    }
+    lanes_sum(c, p, sum);
+    twist_push(&at.a, c->spin_a, p, sum, at.mass_a);
+    if (paired) {
+      twist_push(&at.b, c->spin_b, p, sum, at.less_b);
+    }
+  }
+  twist_scatter(&at.a, pack->a, v);
+  if (paired) {
+    twist_scatter(&at.b, pack->b, v);
+  }
+}
+
+static void packs_push(const hapi_packs *packs, double (*v)[6])
+{
+  for (uint32_t i = 0; i < packs->count; ++i) {
+    const hapi_pack *pack = &packs->of[i];
+    if (pack->paired) {
+      pack_push(packs, pack, v, true);
+    } else {
+      pack_push(packs, pack, v, false);
+    }
+  }
 }
 
 static inline void pack_sweep(const hapi_packs *packs, const hapi_pack *pack, double (*v)[6],

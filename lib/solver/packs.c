@@ -283,6 +283,22 @@ static void packs_fill(const hapi_packs *packs, const hapi_row *rows)
   }
 }
 
+static void packs_set_impulses(const hapi_packs *packs, const hapi_row *rows)
+{
+  for (uint32_t i = 0; i < packs->packable_count; ++i) {
+    if (packs->packables[i].place != HAPI_NO_PLACE) {
+      lane_set_impulses(packs, packs->packables[i].place, &rows[packs->packables[i].row]);
+    }
+  }
+}
+
+/* Whether no row was made, went or moved. */
+static bool packs_stand(const hapi_packs *packs, uint32_t row_count, uint32_t body_count)
+{
+  return packs->count > 0 && packs->filled == packs->made && packs->held == packs->ready &&
+         packs->row_count == row_count && packs->body_count == body_count;
+}
+
 /* Whether what may be packed is what it was, in the same places. */
 static bool packs_hold(const hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
                        uint32_t body_count)
@@ -322,6 +338,10 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
     packs->count = 0;
     return false;
   }
+  if (packs_stand(packs, row_count, body_count)) {
+    packs_set_impulses(packs, rows);
+    return true;
+  }
   if (!packs_hold(packs, rows, row_count, body_count)) {
     packs->row_count = row_count;
     packs->body_count = body_count;
@@ -344,6 +364,8 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
     }
   }
   packs_fill(packs, rows);
+  packs->filled = packs->made;
+  packs->held = packs->ready;
   return true;
 }
 
@@ -360,12 +382,7 @@ void hapi_packs_store(const hapi_packs *packs, hapi_row *rows)
 
 void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows)
 {
-  for (uint32_t i = 0; i < packs->packable_count; ++i) {
-    const hapi_packable *packable = &packs->packables[i];
-    if (packable->place != HAPI_NO_PLACE) {
-      lane_set_impulses(packs, packable->place, &rows[packable->row]);
-    }
-  }
+  packs_set_impulses(packs, rows);
 }
 
 void hapi_packs_forget(hapi_packs *packs)

@@ -76,6 +76,8 @@ struct hapi_packs;
 
 /* How the packs are worked on; by what the processor can, with the same bits. */
 typedef struct hapi_pack_work {
+  /* Adds what the impulses do to v. */
+  void (*push)(const struct hapi_packs *packs, double (*v)[6]);
   void (*sweep)(const struct hapi_packs *packs, double (*v)[6], bool forward, hapi_corrections *io);
   /* See sweep_way in contact_solver.c: J, and the next begin. */
   double (*way_energy)(const double *now, const double *begin, const double *response,
@@ -106,7 +108,10 @@ typedef struct hapi_packs {
   uint32_t loose_rows;
   uint32_t height;    /* the highest level */
   bool in_use;        /* the impulses of packed rows are here */
-  uint64_t made;      /* see hapi_row, the last one */
+  uint64_t made;      /* see hapi_row, the last one; counts also rows that went to another place */
+  uint64_t filled;    /* the last one when the packs were filled, */
+  uint32_t ready;     /* contacts that may be packed, of the rows so far */
+  uint32_t held;      /* and when the packs were filled */
   uint32_t row_count; /* all rows, when the packs were made */
   uint32_t body_count;
 } hapi_packs;

@@ -57,7 +57,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   memset(solver->v[HAPI_STATIC_ROW], 0, sizeof solver->v[0]);
   memset(solver->free[HAPI_STATIC_ROW], 0, sizeof solver->free[0]);
   solver->body_count = 1;
-  solver->row_count = 0;
+  hapi_solver_clear(solver);
   solver->apart = true;
   rows->hand = HUGE_VAL;
   bodies->resting = 0;
@@ -281,6 +281,34 @@ static void account_row(hapi_bodies *bodies, const hapi_solver *solver, const ha
   }
 }
 
+/* Of the rows of a contact, from its first one on; returns how many. */
+static inline uint32_t account_contact(const hapi_rows *rows, hapi_bodies *bodies,
+                                       hapi_body_contacts *contacts, uint32_t first, bool observes)
+{
+  const hapi_row *row = &rows->solver.rows[first];
+  const hapi_row_source *source = &rows->sources[first];
+  HAPI_ASSERT_INDEX(source->contact, contacts->memory_count);
+  HAPI_ASSERT(source->part == 0 && source->count > 0);
+  double *impulse = contacts->memory[source->contact].impulse;
+  bool pushes = false;
+  for (uint32_t i = 0; i < source->count; ++i) {
+    HAPI_ASSERT_INDEX(source[i].part, 3);
+    impulse[source[i].part] = row[i].impulse;
+    pushes = pushes || row[i].impulse != 0.0;
+  }
+  contacts->active += row->impulse > 0.0;
+  if (pushes) {
+    body_touch(hapi_bodies_at(bodies, source->body_a));
+    body_touch(hapi_bodies_at(bodies, source->body_b));
+  }
+  for (uint32_t i = 0; source->gives && i < source->count; ++i) {
+    if (row[i].impulse != 0.0) {
+      account_row(bodies, &rows->solver, &row[i], source, observes);
+    }
+  }
+  return source->count;
+}
+
 /* Keeps the impulses for the next tick, and says who got them. observes: bodies->given is asked
  * for. */
 static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_contacts *contacts,
@@ -289,25 +317,23 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
   const hapi_solver *solver = &rows->solver;
   contacts->active = 0;
   HAPI_ASSERT(solver->row_count <= rows->capacity);
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
+  for (uint32_t i = 0; i < solver->row_count;) {
     const hapi_row *row = &solver->rows[i];
     const hapi_row_source *source = &rows->sources[i];
+    if (!source->pointer && !source->joint) {
+      i += account_contact(rows, bodies, contacts, i, observes);
+      continue;
+    }
+    ++i;
     if (source->pointer) {
       if (row->impulse != 0.0 && source->body_a != HAPI_SLOT_NONE) {
         account_pointer(bodies, row, &bodies->of[source->body_a]);
       }
       continue;
     }
-    if (source->joint) {
-      HAPI_ASSERT_INDEX(source->contact, joints->count);
-      HAPI_ASSERT_INDEX(source->part, HAPI_JOINT_PARTS);
-      joints->memory[joints->of[source->contact].slot].impulse[source->part] = row->impulse;
-    } else {
-      HAPI_ASSERT_INDEX(source->contact, contacts->memory_count);
-      HAPI_ASSERT_INDEX(source->part, 3);
-      contacts->memory[source->contact].impulse[source->part] = row->impulse;
-      contacts->active += source->part == 0 && row->impulse > 0.0;
-    }
+    HAPI_ASSERT_INDEX(source->contact, joints->count);
+    HAPI_ASSERT_INDEX(source->part, HAPI_JOINT_PARTS);
+    joints->memory[joints->of[source->contact].slot].impulse[source->part] = row->impulse;
     if (row->impulse == 0.0) {
       continue;
     }
@@ -328,9 +354,10 @@ static bool rows_stop_push_out(hapi_rows *rows)
   if (solver->apart) { /* rows of pointers that are no proxies: none of them pushes out */
     return false;
   }
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
+  for (uint32_t i = 0; i < solver->row_count && !any;) {
     const hapi_row_source *source = &rows->sources[i];
-    any = any || (source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0));
+    any = source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0);
+    i += source->pointer || source->joint ? 1 : source->count; /* frictions do not */
   }
   for (uint32_t i = 0; any && i < solver->row_count; ++i) {
     if (rows->sources[i].pushes_out) {
