@@ -396,8 +396,9 @@ static int clip_disc(double radius, hapi_spot *spots, int count)
   hapi_spot clipped[HAPI_SPOTS_MAX];
   memset(clipped, 0, sizeof clipped);
   overlap o = {.polygon = spots, .corners = count, .radius = radius, .out = clipped};
-  if (count == 1) {
-    return spots[0].x * spots[0].x + spots[0].y * spots[0].y <= radius * radius ? 1 : 0;
+  if (count <= 1) {
+    bool inside = count == 1 && hypot(spots[0].x, spots[0].y) <= radius;
+    return inside ? 1 : 0;
   }
   o.left_at = -1;
   plane_of(&o);
