@@ -241,7 +241,7 @@ static double work_on(const hapi_local_body *body, const hapi_solver *solver, co
                       double impulse)
 {
   double mean[6];
-  if (!hapi_body_is_owned(body)) {
+  if (body == NULL || !hapi_body_is_owned(body)) {
     return 0.0;
   }
   memcpy(mean, body->start_twist, sizeof mean);
