@@ -662,7 +662,8 @@ void hapi_solver_run(hapi_solver *solver)
       before[0] = before[1] = 0.0;
       dearest = spent > dearest ? spent : dearest;
       direct = !solver->too_dear; /* now, and so in the next round */
-      if (direct && solver->direct_residual < solver->tolerance) {
+      if (direct &&
+          solver->direct_residual < (solver->reduced ? HAPI_UNSOLVED : solver->tolerance)) {
         solver->residual = solver->direct_residual;
         break;
       }

@@ -49,6 +49,8 @@ typedef struct hapi_solver {
   uint32_t dear_runs; /* inner: for so many runs more */
   uint32_t vain_runs; /* inner: one after the other, in which no direct solve was any better */
   bool too_dear;      /* inner: an island was too large or too dear for the budget */
+  bool reduced; /* inner: by sweeps over bounds alone (island_reduced.c) little is left undone,
+                         and plain sweeps would only spoil it */
   double direct_residual; /* inner: the largest correction due after a direct run, m/s */
   uint32_t sweeps;        /* out */
   uint64_t updates;       /* out: row updates, direct solves counted by their cost */

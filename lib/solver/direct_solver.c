@@ -306,6 +306,37 @@ static bool improve_hubs(hapi_island *is, const lists *all, uint16_t first_leaf,
   return better;
 }
 
+/* ---- mechanisms ---- */
+
+/* After rounds that led to nothing: sweeps over the rows with bounds, then a round from the set that
+ * they have found. Returns the cost, of which `cost` for that round. */
+static uint32_t mechanism_improve(hapi_island *is, uint32_t step, uint32_t budget, double *io_due)
+{
+  hapi_solver *solver = is->solver;
+  const uint32_t cost = INNER_ROUNDS * step;
+  state_keep(is);
+  uint32_t spent = hapi_island_reduce(is, step, budget);
+  double due = spent > 0 ? hapi_island_inspect(is, false) : HUGE_VAL;
+  if (!(due < *io_due)) {
+    go_back(is);
+    return spent;
+  }
+  *io_due = due;
+  ++solver->direct_solves;
+  if (due >= solver->tolerance && cost <= budget - spent) {
+    state_keep(is);
+    spent += cost;
+    (void)island_improve(is, due, false, &due);
+    if (due < *io_due) {
+      *io_due = due;
+    } else {
+      go_back(is);
+    }
+  }
+  solver->reduced = solver->reduced || *io_due < HAPI_UNSOLVED;
+  return spent;
+}
+
 /* ---- all islands ---- */
 
 /* One island; the cost in row updates. */
@@ -345,6 +376,9 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
     bool last = 2 * (uint64_t)(budget - cost) <= solver->update_budget;
     solver->direct_solves += island_improve(is, due, last, &due);
     spent = cost;
+    if (due > HAPI_COARSE) {
+      spent += mechanism_improve(is, step, budget - spent, &due);
+    }
   }
   solver->direct_residual = fmax(solver->direct_residual, due);
   return spent;
@@ -356,6 +390,7 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   lists all;
   uint32_t spent = 0;
   solver->too_dear = false;
+  solver->reduced = false;
   solver->direct_residual = HUGE_VAL;
   if (solver->body_count > HAPI_SOLVER_BODIES ||
       solver->work_count < HAPI_ROW_ARRAYS * (size_t)solver->row_count) {

@@ -96,6 +96,16 @@ void hapi_island_restore(hapi_island *is);
 /* Impulses of the rows that are free or tied, cut at their bounds, from the saved ones. */
 void hapi_island_solve(hapi_island *is);
 
+/* The two halves of it, without cuts: the matrix, and dv, what the errors of the rows that are free
+ * or tied ask for; then dv out of such a right side. */
+void hapi_island_factor(hapi_island *is);
+void hapi_island_substitute(hapi_island *is);
+
+/* Of an island with joints: the rows with bounds, each answered by the whole mechanism
+ * (island_reduced.c). After place; step: the cost of a round. Returns the cost in row updates; 0:
+ * nothing was done. */
+uint32_t hapi_island_reduce(hapi_island *is, uint32_t step, uint32_t budget);
+
 /* One sweep: where a normal lets go, its frictions go as well, and that shows. */
 void hapi_island_settle(hapi_island *is);
 
