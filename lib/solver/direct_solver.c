@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "solver/island.h"
+#include "solver/island_reduced.h"
 
 #define INNER_ROUNDS 2 /* active sets tried from one state */
 #define WORSE 30.0     /* how much the largest correction may grow in a round */
@@ -308,8 +309,8 @@ static bool improve_hubs(hapi_island *is, const lists *all, uint16_t first_leaf,
 
 /* ---- mechanisms ---- */
 
-/* After rounds that led to nothing: sweeps over the rows with bounds, then a round from the set that
- * they have found. Returns the cost, of which `cost` for that round. */
+/* After rounds that led to nothing: the rows with bounds by themselves, then rounds from the set
+ * that they lead to. Returns the cost in row updates. */
 static uint32_t mechanism_improve(hapi_island *is, uint32_t step, uint32_t budget, double *io_due)
 {
   hapi_solver *solver = is->solver;
@@ -333,7 +334,9 @@ static uint32_t mechanism_improve(hapi_island *is, uint32_t step, uint32_t budge
       go_back(is);
     }
   }
-  solver->reduced = solver->reduced || *io_due < HAPI_UNSOLVED;
+  if (*io_due < HAPI_UNSOLVED && solver->direct_end != HAPI_DIRECT_DEAR) {
+    solver->direct_end = HAPI_DIRECT_REDUCED;
+  }
   return spent;
 }
 
@@ -358,7 +361,7 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
     return 0;
   }
   if (is->free_rows == 0 || is->free_rows > solver->direct_rows || !hapi_island_gather(is)) {
-    solver->too_dear = solver->too_dear || is->free_rows > 0;
+    solver->direct_end = is->free_rows > 0 ? HAPI_DIRECT_DEAR : solver->direct_end;
     solver->direct_residual = HUGE_VAL;
     return 0;
   }
@@ -368,7 +371,7 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
   hub_state hubs = {.left = budget, .step = step};
   bool has_leaves = leaf != all->last_leaf[index] && solver->hub_count <= HUBS_MAX;
   if (!hapi_island_place(is) || (has_leaves ? step : cost) > budget) {
-    solver->too_dear = true;
+    solver->direct_end = HAPI_DIRECT_DEAR;
   } else if (has_leaves) {
     solver->direct_solves += improve_hubs(is, all, leaf, &hubs, &due);
     spent = budget - hubs.left;
@@ -389,8 +392,7 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   hapi_island is;
   lists all;
   uint32_t spent = 0;
-  solver->too_dear = false;
-  solver->reduced = false;
+  solver->direct_end = HAPI_DIRECT_DONE;
   solver->direct_residual = HUGE_VAL;
   if (solver->body_count > HAPI_SOLVER_BODIES ||
       solver->work_count < HAPI_ROW_ARRAYS * (size_t)solver->row_count) {

@@ -101,11 +101,6 @@ void hapi_island_solve(hapi_island *is);
 void hapi_island_factor(hapi_island *is);
 void hapi_island_substitute(hapi_island *is);
 
-/* Of an island with joints: the rows with bounds, each answered by the whole mechanism
- * (island_reduced.c). After place; step: the cost of a round. Returns the cost in row updates; 0:
- * nothing was done. */
-uint32_t hapi_island_reduce(hapi_island *is, uint32_t step, uint32_t budget);
-
 /* One sweep: where a normal lets go, its frictions go as well, and that shows. */
 void hapi_island_settle(hapi_island *is);
 

@@ -13,11 +13,12 @@
  * answers (bounded.c), then the impulses of the joints that go with theirs. What R and rounding
  * have left of the errors the next round takes. */
 
+#include "solver/island_reduced.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "solver/bounded.h"
-#include "solver/island.h"
 
 #define SOFTENING 1e-6 /* R, relative to the row's own response */
 #define ROUNDS 6
