@@ -12,6 +12,7 @@
 #define ARROW_MAX 1.1F     /* likewise */
 #define FORCE_MIN_N 0.02F
 #define FLOOR_REACH 60.0F /* of the scene's size */
+#define STRAY 5.0F        /* times as far from the middle as the mean: one body of ten cannot be */
 #define GIANT 4.0F        /* a pointer so many times as large as the scene is not drawn */
 
 static const hap_pose identity = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
@@ -263,12 +264,42 @@ static float pointer_extent(const view_pointer *pointer)
   return (float)(pointer->radius + sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]));
 }
 
+static float ball_distance(const camera_ball *ball, const float from[3])
+{
+  const float *c = ball->centre;
+  const float v[3] = {c[0] - from[0], c[1] - from[1], c[2] - from[2]};
+  return sqrtf(view_dot(v, v));
+}
+
+/* Leaves out the few that have rolled or flown away: all others would be specks. */
+static size_t strays_drop(camera_ball *balls, size_t count)
+{
+  float middle[3] = {0.0F, 0.0F, 0.0F};
+  float mean = 0.0F;
+  size_t kept = 0;
+  for (size_t i = 0; i < count; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      middle[k] += balls[i].centre[k] / (float)count;
+    }
+  }
+  for (size_t i = 0; i < count; ++i) {
+    mean += ball_distance(&balls[i], middle) / (float)count;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    if (ball_distance(&balls[i], middle) <= STRAY * mean + balls[i].radius) {
+      balls[kept++] = balls[i];
+    }
+  }
+  return kept;
+}
+
 /* All that moves, then what stands about and is not much larger. Gives the largest that moves. */
 static size_t bodies_balls(const things *of, const view_frame *frame, float *out_largest)
 {
   size_t count = 0;
   float largest = 0.0F;
   for (int standing = 0; standing < 2; ++standing) {
+    count = strays_drop(of->balls, count); /* of what moves */
     for (size_t i = 0; i < of->count; ++i) {
       const thing *t = &of->list[i];
       bool stands = t->body == HAP_SCENE_WORLD;
