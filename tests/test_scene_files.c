@@ -796,6 +796,25 @@ static const char robot[] =
     "<geom type='capsule' size='.03' fromto='0 0 0 .2 0 0'/></body>\n"
     "</body></worldbody></mujoco>\n";
 
+/* What is too thin or too far away takes nothing of the rest. */
+static const char odd[] =
+    "<mujoco>\n<worldbody>\n<geom type='plane' size='1 1 .1'/>\n"
+    "<body pos='0 0 .1'><freejoint/><geom type='box' size='.1 .1 .1'/>\n"
+    "<geom type='box' size='.1 .1 1e-9' mass='0'/></body>\n"
+    "<body pos='3e4 0 1'><freejoint/><geom size='.1'/></body>\n"
+    "<body pos='8 0 .1'><freejoint/><geom size='.1'/></body>\n"
+    "</worldbody></mujoco>\n";
+
+TEST(a_file_of_odd_lengths_and_places_is_touched)
+{
+  file_write(folder_path("odd.xml"), odd);
+  CHECK_SAY(run("--scene %s --lockstep", folder_path("odd.xml")) == 0, "%s", ran.err);
+  CHECK_SAY(says("odd.xml:5: geom left out: a length that is not within 1e-6 and 1e6 m\n"), "%s",
+            ran.err);
+  CHECK_SAY(strstr(ran.out, "\nfault: none\n") != NULL, "%s", ran.out);
+  CHECK(strstr(ran.out, "\npeak_force_n: 0\n") == NULL);
+}
+
 TEST(hapode_run_loads_a_file)
 {
   file_write(folder_path("robot.xml"), robot);

@@ -80,6 +80,7 @@ typedef struct poked {
   hap_device *device;
   uint32_t bodies;
   hap_pose before[BODIES_MOST];
+  int64_t before_ns;
   double fastest; /* m/s */
   double lowest;  /* m */
   double highest;
@@ -116,15 +117,18 @@ static void poke_begin(poked *p, const char *path, hap_drive drive)
 static void poke_look(poked *p, bool first)
 {
   hap_pose now[BODIES_MOST];
-  REQUIRE(hap_scene_poses(p->scene, hap_session_now(p->session), 0, p->bodies, now) >= HAP_OK);
+  const int64_t now_ns = hap_session_now(p->session);
+  const double passed = 1e-9 * (double)(now_ns - p->before_ns);
+  REQUIRE(hap_scene_poses(p->scene, now_ns, 0, p->bodies, now) >= HAP_OK);
   for (uint32_t i = 0; i < p->bodies; ++i) {
     double way[3];
     hapi_v3_sub(p->before[i].position, now[i].position, way);
-    p->fastest = first ? 0.0 : fmax(p->fastest, 1e3 / LOOK_MS * hapi_v3_norm(way));
+    p->fastest = first ? 0.0 : fmax(p->fastest, hapi_v3_norm(way) / passed);
     p->lowest = fmin(p->lowest, now[i].position[2]);
     p->highest = fmax(p->highest, now[i].position[2]);
   }
   memcpy(p->before, now, sizeof now);
+  p->before_ns = now_ns;
 }
 
 /* Through the body to its other side, from where the hand is, and to the floor. */

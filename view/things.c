@@ -12,7 +12,7 @@
 #define ARROW_MAX 1.1F     /* likewise */
 #define FORCE_MIN_N 0.02F
 #define FLOOR_REACH 60.0F /* of the scene's size */
-#define STRAY 5.0F        /* times as far from the middle as the mean: one body of ten cannot be */
+#define STRAY 4.0F        /* times as far from the middle as the mean: one of eight cannot be */
 #define GIANT 4.0F        /* a pointer so many times as large as the scene is not drawn */
 
 static const hap_pose identity = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
@@ -157,6 +157,16 @@ static void vector_into(const hap_pose *frame, const double in[3], bool is_point
   }
 }
 
+static float body_extent(const things *of, uint32_t body)
+{
+  float largest = 0.0F;
+  for (size_t i = 0; i < of->count; ++i) {
+    const thing *t = &of->list[i];
+    largest = t->body == body ? fmaxf(largest, t->extent) : largest;
+  }
+  return largest;
+}
+
 static void axes_read(const hap_scene *scene, uint32_t joints, things *io)
 {
   for (uint32_t i = 0; i < joints; ++i) {
@@ -169,6 +179,7 @@ static void axes_read(const hap_scene *scene, uint32_t joints, things *io)
       axis->body = joint.body_a;
       vector_into(&body.pose, joint.anchor, true, axis->anchor);
       vector_into(&body.pose, joint.axis[k], false, axis->direction);
+      axis->extent = body_extent(io, joint.body_a);
     }
   }
 }
@@ -466,20 +477,22 @@ static void touch_place(things *io, const view_touch *touch, float size)
   colour_set(dot, colour, 1.0F);
 }
 
+/* Through the body and not much longer, so that of a long chain more is seen than its axes. */
 static void axis_place(things *io, const thing_axis *axis, const view_frame *frame, float size)
 {
   static const float colour[3] = {0.16F, 0.18F, 0.22F};
+  const float through = 1.2F * axis->extent;
+  const float half = through > 0.0F ? fminf(0.09F * size, through) : 0.09F * size;
   const hap_pose *body = frame_of(frame, axis->body);
   double ends[2][3];
   float world[2][3];
   for (int k = 0; k < 2; ++k) {
     for (int i = 0; i < 3; ++i) {
-      ends[k][i] =
-          axis->anchor[i] + (k == 0 ? -1.0 : 1.0) * 0.09 * (double)size * axis->direction[i];
+      ends[k][i] = axis->anchor[i] + (k == 0 ? -1.0 : 1.0) * (double)half * axis->direction[i];
     }
     view_transform(body, ends[k], world[k]);
   }
-  stick_place(io, world[0], world[1], 0.007F * size, colour);
+  stick_place(io, world[0], world[1], 0.08F * half, colour);
 }
 
 /* The string that a hand is pulled by, and its end. */

@@ -458,7 +458,7 @@ function withoutStrays(balls) {
   const middle = balls.reduce((sum, ball) => add(sum, scaled(ball.place, share)), [0, 0, 0]);
   const far = balls.map((ball) => norm(sub(ball.place, middle)));
   const mean = share * far.reduce((sum, x) => sum + x, 0);
-  return balls.filter((ball, i) => far[i] <= 5 * mean + ball.reach);
+  return balls.filter((ball, i) => far[i] <= 4 * mean + ball.reach);
 }
 
 // What moves is framed.
