@@ -13,16 +13,15 @@
 #include "tests/oracle_notes.h"
 
 typedef struct oracle_found {
-  size_t differ; /* numbers that are not equal within 1e-6 */
-  size_t silent; /* of these: no line of the reader is the reason */
-  char first
-      [400]; /* the first of them, a silent one where there is any; of a file that MuJoCo refuses
-                      its reason */
+  size_t differ;   /* numbers that are not equal within 1e-6 */
+  size_t silent;   /* of these: no line of the reader is the reason */
+  char first[400]; /* the first of them, a silent one where there is any; of a file that MuJoCo
+                      refuses its reason */
 } oracle_found;
 
 bool scene_oracle_is_there(void);
-/* notes: what the reader has said of the file. False: MuJoCo refuses the file. Meshes of bodies are compared by their mass and the box around
- * them. */
+/* notes: what the reader has said of the file. False: MuJoCo refuses the file. Meshes of bodies are
+ * compared by their mass and the box around them. */
 bool scene_oracle(const char *path, const import_model *ours, const oracle_notes *notes,
                   oracle_found *out);
 

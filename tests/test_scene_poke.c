@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Scenes from files under a hand that goes after one body after the other, wherever it is, and pokes
- * through it: nothing flies away, nothing faults, and it comes to rest. In lockstep, and in real
- * time beside whatever the machine does. */
+/* Scenes from files under a hand that goes after one body after the other, wherever it is, and
+ * pokes through it: nothing flies away, and nothing faults. In lockstep, and in real time beside
+ * whatever the machine does. */
 
 #include "tests/tap.h"
 

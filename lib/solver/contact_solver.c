@@ -349,7 +349,7 @@ double hapi_ball_update(hapi_solver *solver, hapi_row *first)
 
 static void update_ball(hapi_solver *solver, hapi_row *first, corrections *io)
 {
-  double old[3];
+  double old[3] = {0.0};
   for (int i = 0; i < first->ball; ++i) {
     old[i] = first[i].impulse;
   }
