@@ -19,6 +19,27 @@ static hap_status build_fail(import_work *work, import_place at, hap_status stat
 
 /* ---- geoms ---- */
 
+/* Lengths as hap_scene_add_geom takes them, m. */
+#define LENGTH_LEAST 1e-6
+#define LENGTH_MOST 1e6
+
+static bool lengths_fit(const hap_geom_def *def)
+{
+  const double lengths[] = {def->radius, def->length, def->edges[0], def->edges[1], def->edges[2]};
+  const size_t first = def->shape == HAP_SHAPE_BOX || def->shape == HAP_SHAPE_FIELD ? 2 : 0;
+  const size_t end = def->shape == HAP_SHAPE_BOX                                           ? 5
+                     : def->shape == HAP_SHAPE_FIELD                                       ? 4
+                     : def->shape == HAP_SHAPE_SPHERE                                      ? 1
+                     : def->shape == HAP_SHAPE_CAPSULE || def->shape == HAP_SHAPE_CYLINDER ? 2
+                                                                                           : 0;
+  for (size_t i = first; i < end; ++i) {
+    if (!(lengths[i] >= LENGTH_LEAST && lengths[i] <= LENGTH_MOST)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /* False: not as a geom of that body. */
 static bool geom_fill(const import_geom *geom, const hap_pose *frame, hap_geom_def *out)
 {
@@ -70,13 +91,22 @@ static bool geom_fill(const import_geom *geom, const hap_pose *frame, hap_geom_d
   return true;
 }
 
+/* NULL: it is filled in. Else why it cannot be. */
+static const char *geom_missing(const import_geom *geom, const hap_pose *frame, hap_geom_def *out)
+{
+  return !geom_fill(geom, frame, out) ? "its shape"
+         : !lengths_fit(out)          ? "a length that is not within 1e-6 and 1e6 m"
+                                      : NULL;
+}
+
 static hap_status fixed_geoms_add(import_work *work, const import_body *body, hap_scene *scene)
 {
   for (const import_geom *geom = body->geoms; geom != NULL; geom = geom->next) {
     hap_geom_def def;
     hap_detail why = {""};
-    if (!geom_fill(geom, &body->pose_world, &def)) {
-      import_note(work, geom->at, "geom left out: its shape");
+    const char *why_not = geom_missing(geom, &body->pose_world, &def);
+    if (why_not != NULL) {
+      import_note(work, geom->at, "geom left out: %s", why_not);
       continue;
     }
     hap_status status = hap_scene_add_geom(scene, &def, NULL, &why);
@@ -112,9 +142,10 @@ static size_t geoms_fill(import_work *work, const import_model *model, const imp
     hapi_pose_into(frame->position, frame->quat_wxyz, &body->pose_world, &inside);
     for (const import_geom *geom = body->geoms; geom != NULL; geom = geom->next) {
       const bool stands = geom->shape == IMPORT_PLANE || geom->shape == IMPORT_FIELD;
-      if (stands || !geom_fill(geom, &inside, &out[count])) {
-        import_note(work, geom->at, "geom left out: %s",
-                    stands ? "a plane or height field of a body that moves" : "its shape");
+      const char *why = stands ? "a plane or height field of a body that moves"
+                               : geom_missing(geom, &inside, &out[count]);
+      if (why != NULL) {
+        import_note(work, geom->at, "geom left out: %s", why);
       } else {
         ++count;
       }

@@ -100,7 +100,16 @@ static hap_status size_read(mjcf *m, const mjcf_item *item, import_geom *geom)
   return HAP_OK;
 }
 
-static hap_status mass_read(mjcf *m, const mjcf_item *item, const mjcf_mesh *of, import_geom *geom)
+/* A height field weighs as a box of its mean height, base included, as MuJoCo has it. */
+static void field_mass(const mjcf_field *field, double density, import_mass *out)
+{
+  const double half[3] = {field->size[0], field->size[1],
+                          0.25 * field->size[2] + 0.5 * field->size[3]};
+  import_shape_mass(IMPORT_BOX, half, density, out);
+}
+
+static hap_status mass_read(mjcf *m, const mjcf_item *item, const mjcf_mesh *of,
+                            const mjcf_field *field, import_geom *geom)
 {
   double density = 1000.0;
   double mass = -1.0;
@@ -118,6 +127,8 @@ static hap_status mass_read(mjcf *m, const mjcf_item *item, const mjcf_mesh *of,
   if (of != NULL) {
     own = of->mass;
     import_mass_scale(&own, density);
+  } else if (field != NULL) {
+    field_mass(field, density, &own);
   } else {
     import_shape_mass(geom->shape, geom->size, mass >= 0.0 ? 1.0 : density, &own);
   }
@@ -236,7 +247,7 @@ hap_status mjcf_read_geom(mjcf *m, const mjcf_item *item, const hap_pose *frame,
     geom->field = field->field;
     memcpy(geom->size, field->size, 2 * sizeof geom->size[0]);
   }
-  HAPI_TRY(mass_read(m, item, mesh, geom));
+  HAPI_TRY(mass_read(m, item, mesh, field, geom));
   HAPI_TRY(colour_read(m, item, geom));
   return contact_read(m, item, geom);
 }

@@ -23,13 +23,19 @@ const REALS = ['body_mass', 'body_ipos', 'body_iquat', 'body_inertia', 'qpos0', 
 // MuJoCo sees files of its own memory alone: what a scene names is copied there.
 const copied = new Set();
 
+// Frames stay as the file has them, and what is only seen is kept: neither changes any motion.
+const NEUTRAL = /\b(?:align|alignfree|discardvisual)\s*=\s*(["'])true\1/g;
+
 function copy(file) {
   if (copied.has(file) || !fs.statSync(file, {throwIfNoEntry: false})?.isFile()) {
     return false;
   }
   copied.add(file);
   mujoco.FS.mkdirTree(path.dirname(file));
-  mujoco.FS.writeFile(file, fs.readFileSync(file));
+  const bytes = fs.readFileSync(file);
+  const isScene = /\.(xml|mjcf)$/i.test(file);
+  mujoco.FS.writeFile(file, isScene
+    ? Buffer.from(bytes.toString('latin1').replace(NEUTRAL, ''), 'latin1') : bytes);
   return true;
 }
 

@@ -14,17 +14,23 @@
 #endif
 
 #define NEAR 1e-6
+#define NO_RANGE 1e12 /* m, rad: the reader takes no limit for as far as that */
 
 typedef struct comparing {
   const oracle_model *theirs;
   bool by_names;
+  const oracle_notes *notes;
   oracle_found *out;
 } comparing;
 
 static void number_differs(const comparing *c, const char *what, const char *of, double ours,
                            double theirs)
 {
-  if (c->out->differ++ == 0) {
+  const bool silent = !oracle_notes_explain(c->notes, what, of);
+  const bool first = c->out->differ == 0 || (silent && c->out->silent == 0);
+  ++c->out->differ;
+  c->out->silent += silent;
+  if (first) {
     (void)snprintf(c->out->first, sizeof c->out->first, "%s of \"%s\" is %.9g and not %.9g", what,
                    of, ours, theirs);
   }
@@ -121,7 +127,8 @@ static void joint_compare(const comparing *c, const import_joint *joint, int j)
   vectors_compare(c, "axis", joint->name, joint->axis, joints->axis + 3 * j, 3);
   double zero = joints->qpos0[joints->qpos_at[j]];
   const double range[2] = {joint->low + zero, joint->high + zero};
-  bool limited = joints->limited[j] != 0;
+  const double *theirs = joints->range + 2 * (ptrdiff_t)j;
+  bool limited = joints->limited[j] != 0 && theirs[1] - theirs[0] < NO_RANGE;
   flags_compare(c, "being limited", joint->name, isfinite(joint->low) != 0, limited);
   if (limited && isfinite(joint->low)) {
     vectors_compare(c, "range", joint->name, range, joints->range + 2 * j, 2);
@@ -269,7 +276,8 @@ bool scene_oracle_is_there(void)
   return oracle_node_is_there() || oracle_library_is_there();
 }
 
-bool scene_oracle(const char *path, const import_model *ours, oracle_found *out)
+bool scene_oracle(const char *path, const import_model *ours, const oracle_notes *notes,
+                  oracle_found *out)
 {
   oracle_model theirs;
   memset(out, 0, sizeof *out);
@@ -282,7 +290,7 @@ bool scene_oracle(const char *path, const import_model *ours, oracle_found *out)
   }
   out->first[0] = '\0'; /* a warning */
   const bool urdf = ours->bodies->next != NULL && strcmp(ours->bodies->name, "") == 0;
-  const comparing c = {&theirs, urdf || (end != NULL && strcmp(end, ".urdf") == 0), out};
+  const comparing c = {&theirs, urdf || (end != NULL && strcmp(end, ".urdf") == 0), notes, out};
   model_compare(&c, ours);
   oracle_model_free(&theirs);
   return true;

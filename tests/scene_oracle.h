@@ -10,16 +10,20 @@
 #include <stddef.h>
 
 #include "import/model.h"
+#include "tests/oracle_notes.h"
 
 typedef struct oracle_found {
   size_t differ;   /* numbers that are not equal within 1e-6 */
-  char first[400]; /* the first of them; of a file that MuJoCo refuses its reason */
+  size_t silent;   /* of these: no line of the reader is the reason */
+  char first[400]; /* the first of them, a silent one where there is any; of a file that MuJoCo
+                      refuses its reason */
 } oracle_found;
 
 bool scene_oracle_is_there(void);
-/* False: MuJoCo refuses the file. Meshes of bodies are compared by their mass and the box around
- * them. */
-bool scene_oracle(const char *path, const import_model *ours, oracle_found *out);
+/* notes: what the reader has said of the file. False: MuJoCo refuses the file. Meshes of bodies are
+ * compared by their mass and the box around them. */
+bool scene_oracle(const char *path, const import_model *ours, const oracle_notes *notes,
+                  oracle_found *out);
 
 /* Where a body of MJCF, from 0, has its frame after a time, in MuJoCo's own steps of 0.2 ms. False:
  * MuJoCo refuses the file, or has no such body. */

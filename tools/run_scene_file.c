@@ -14,7 +14,9 @@
 #endif
 
 #define VISITS_MOST 12u
-#define VISIT_S 1.5 /* from a body to the next */
+#define VISIT_S 1.5      /* from a body to the next */
+#define HAND_SPEED 2.0   /* m/s at most: a faster one is taken for a fault of the device */
+#define HAND_REACH 900.0 /* m from the middle of the world: a path takes no more than 1000 */
 
 /* A built-in scene's name has neither a slash nor an end. */
 static bool scene_is_file(const char *spec)
@@ -53,17 +55,27 @@ static hap_status file_load(const run_options *options, bool says, hap_scene **o
 
 #endif
 
-/* The corners of all that moves. False: nothing does. */
+static bool box_is_near(const dReal box[6])
+{
+  for (int k = 0; k < 6; ++k) {
+    if (!(fabs(box[k]) < HAND_REACH)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* The corners of all that moves where a hand can go. False: nothing does. */
 static bool scene_extent(const hap_scene *from, double low[3], double high[3])
 {
   hapi_v3_set(low, INFINITY, INFINITY, INFINITY);
   hapi_v3_set(high, -INFINITY, -INFINITY, -INFINITY);
   for (uint32_t i = 0; i < from->geom_count; ++i) {
     dReal box[6];
-    if (from->geoms[i].body == HAP_SCENE_WORLD) {
+    dGeomGetAABB(from->geoms[i].geom, box);
+    if (from->geoms[i].body == HAP_SCENE_WORLD || !box_is_near(box)) {
       continue;
     }
-    dGeomGetAABB(from->geoms[i].geom, box);
     for (int k = 0; k < 3; ++k) {
       low[k] = fmin(low[k], box[2 * k]);
       high[k] = fmax(high[k], box[2 * k + 1]);
@@ -85,6 +97,26 @@ static double ground_height(const hap_scene *from, double low)
   return ground;
 }
 
+/* A path of a hand that is being written. */
+typedef struct hand_path {
+  char *out;
+  size_t size;
+  size_t used;
+  double time;
+  double at[3];
+} hand_path;
+
+static void path_go(hand_path *io, double least_s, double x, double y, double z)
+{
+  const double to[3] = {x, y, z};
+  double way[3];
+  hapi_v3_sub(io->at, to, way);
+  io->time += fmax(least_s, hapi_v3_norm(way) / HAND_SPEED);
+  hapi_v3_copy(to, io->at);
+  io->used += (size_t)snprintf(io->out + io->used, io->size - io->used, ";%.4f:%.4f/%.4f/%.4f",
+                               io->time, x, y, z);
+}
+
 /* From beside the scene, at its largest height, through the bodies one after the other, each from
  * where it is down to the ground, to which it may have fallen. Returns the seconds it takes. */
 static double hand_write(const hap_scene *from, double radius, char *out, size_t size)
@@ -97,21 +129,21 @@ static double hand_write(const hap_scene *from, double radius, char *out, size_t
   }
   const double ground = ground_height(from, low[2]) + radius;
   const double away[3] = {low[0] - 4.0 * radius, 0.5 * (low[1] + high[1]), high[2] + 2.0 * radius};
-  size_t used =
+  hand_path path = {.out = out, .size = size};
+  hapi_v3_copy(away, path.at);
+  path.used =
       (size_t)snprintf(out, size, "virtual:path=0:%.4f/%.4f/%.4f", away[0], away[1], away[2]);
   const uint32_t visits = from->body_count < VISITS_MOST ? from->body_count : VISITS_MOST;
-  double time = 0.0;
   for (uint32_t i = 0; i < visits; ++i) {
     const uint32_t body = (uint32_t)((uint64_t)i * from->body_count / visits);
     const dReal *x = dBodyGetPosition(from->bodies[body].body);
-    used += (size_t)snprintf(out + used, size - used, ";%.4f:%.4f/%.4f/%.4f;%.4f:%.4f/%.4f/%.4f",
-                             time + 0.5 * VISIT_S, x[0], x[1], x[2], time + VISIT_S, x[0], x[1],
-                             fmin(ground, x[2]));
-    time += VISIT_S;
+    if (fmax(fmax(fabs(x[0]), fabs(x[1])), fabs(x[2])) < HAND_REACH) {
+      path_go(&path, 0.5 * VISIT_S, x[0], x[1], x[2]);
+      path_go(&path, 0.5 * VISIT_S, x[0], x[1], fmin(ground, x[2]));
+    }
   }
-  time += VISIT_S;
-  (void)snprintf(out + used, size - used, ";%.4f:%.4f/%.4f/%.4f", time, away[0], away[1], away[2]);
-  return time;
+  path_go(&path, VISIT_S, away[0], away[1], away[2]);
+  return path.time;
 }
 
 /* A pointer of the size of the scene's things; the rest as any pointer has it. */

@@ -412,7 +412,9 @@ void grid_label_draw(ink *io, float cell, bool strips, const int size[2])
   const float u = strips_unit(size[1]);
   const float below = strips ? strips_share(size[1]) : 0.0F;
   char text[40];
-  snprintf(text, sizeof text, "grid %g mm", 1e3 * (double)cell);
+  const bool small = (double)cell < 0.999;
+  snprintf(text, sizeof text, "grid %.6g %s", (small ? 1e3 : 1.0) * (double)cell,
+           small ? "mm" : "m");
   ink_text(io,
            (const float[3]){(float)size[0] - 22.0F * u, (float)size[1] * (1.0F - below) - 12.0F * u,
                             8.0F * u},

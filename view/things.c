@@ -12,6 +12,7 @@
 #define ARROW_MAX 1.1F     /* likewise */
 #define FORCE_MIN_N 0.02F
 #define FLOOR_REACH 60.0F /* of the scene's size */
+#define STRAY 4.0F        /* times as far from the middle as the mean: one of eight cannot be */
 #define GIANT 4.0F        /* a pointer so many times as large as the scene is not drawn */
 
 static const hap_pose identity = {.quat_wxyz = {1.0, 0.0, 0.0, 0.0}};
@@ -156,6 +157,16 @@ static void vector_into(const hap_pose *frame, const double in[3], bool is_point
   }
 }
 
+static float body_extent(const things *of, uint32_t body)
+{
+  float largest = 0.0F;
+  for (size_t i = 0; i < of->count; ++i) {
+    const thing *t = &of->list[i];
+    largest = t->body == body ? fmaxf(largest, t->extent) : largest;
+  }
+  return largest;
+}
+
 static void axes_read(const hap_scene *scene, uint32_t joints, things *io)
 {
   for (uint32_t i = 0; i < joints; ++i) {
@@ -168,6 +179,7 @@ static void axes_read(const hap_scene *scene, uint32_t joints, things *io)
       axis->body = joint.body_a;
       vector_into(&body.pose, joint.anchor, true, axis->anchor);
       vector_into(&body.pose, joint.axis[k], false, axis->direction);
+      axis->extent = body_extent(io, joint.body_a);
     }
   }
 }
@@ -263,12 +275,42 @@ static float pointer_extent(const view_pointer *pointer)
   return (float)(pointer->radius + sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]));
 }
 
+static float ball_distance(const camera_ball *ball, const float from[3])
+{
+  const float *c = ball->centre;
+  const float v[3] = {c[0] - from[0], c[1] - from[1], c[2] - from[2]};
+  return sqrtf(view_dot(v, v));
+}
+
+/* Leaves out the few that have rolled or flown away: all others would be specks. */
+static size_t strays_drop(camera_ball *balls, size_t count)
+{
+  float middle[3] = {0.0F, 0.0F, 0.0F};
+  float mean = 0.0F;
+  size_t kept = 0;
+  for (size_t i = 0; i < count; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      middle[k] += balls[i].centre[k] / (float)count;
+    }
+  }
+  for (size_t i = 0; i < count; ++i) {
+    mean += ball_distance(&balls[i], middle) / (float)count;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    if (ball_distance(&balls[i], middle) <= STRAY * mean + balls[i].radius) {
+      balls[kept++] = balls[i];
+    }
+  }
+  return kept;
+}
+
 /* All that moves, then what stands about and is not much larger. Gives the largest that moves. */
 static size_t bodies_balls(const things *of, const view_frame *frame, float *out_largest)
 {
   size_t count = 0;
   float largest = 0.0F;
   for (int standing = 0; standing < 2; ++standing) {
+    count = strays_drop(of->balls, count); /* of what moves */
     for (size_t i = 0; i < of->count; ++i) {
       const thing *t = &of->list[i];
       bool stands = t->body == HAP_SCENE_WORLD;
@@ -435,20 +477,22 @@ static void touch_place(things *io, const view_touch *touch, float size)
   colour_set(dot, colour, 1.0F);
 }
 
+/* Through the body and not much longer, so that of a long chain more is seen than its axes. */
 static void axis_place(things *io, const thing_axis *axis, const view_frame *frame, float size)
 {
   static const float colour[3] = {0.16F, 0.18F, 0.22F};
+  const float through = 1.2F * axis->extent;
+  const float half = through > 0.0F ? fminf(0.09F * size, through) : 0.09F * size;
   const hap_pose *body = frame_of(frame, axis->body);
   double ends[2][3];
   float world[2][3];
   for (int k = 0; k < 2; ++k) {
     for (int i = 0; i < 3; ++i) {
-      ends[k][i] =
-          axis->anchor[i] + (k == 0 ? -1.0 : 1.0) * 0.09 * (double)size * axis->direction[i];
+      ends[k][i] = axis->anchor[i] + (k == 0 ? -1.0 : 1.0) * (double)half * axis->direction[i];
     }
     view_transform(body, ends[k], world[k]);
   }
-  stick_place(io, world[0], world[1], 0.007F * size, colour);
+  stick_place(io, world[0], world[1], 0.08F * half, colour);
 }
 
 /* The string that a hand is pulled by, and its end. */

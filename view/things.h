@@ -32,6 +32,7 @@ typedef struct thing_axis {
   uint32_t body;
   double anchor[3];
   double direction[3];
+  float extent; /* m, of the body's largest thing; 0: it has none */
 } thing_axis;
 
 /* Instances of a mesh in a frame: what throws shadows, then marks, then what one sees through. */

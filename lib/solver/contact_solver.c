@@ -768,8 +768,9 @@ void hapi_solver_run(hapi_solver *solver)
       before[0] = before[1] = 0.0;
       bool first = dearest == 0;
       dearest = spent > dearest ? spent : dearest;
-      direct = !solver->too_dear; /* now, and so in the next round */
-      if (direct && solver->direct_residual < solver->tolerance) {
+      direct = solver->direct_end != HAPI_DIRECT_DEAR; /* now, and so in the next round */
+      const bool reduced = solver->direct_end == HAPI_DIRECT_REDUCED;
+      if (direct && solver->direct_residual < (reduced ? HAPI_UNSOLVED : solver->tolerance)) {
         solver->residual = solver->direct_residual;
         break;
       }

@@ -31,6 +31,14 @@ typedef struct hapi_direct_rest {
   uint32_t vain; /* runs one after the other in which no direct solve was any better */
 } hapi_direct_rest;
 
+/* How a direct run has ended. */
+typedef enum hapi_direct_end {
+  HAPI_DIRECT_DONE = 0,
+  HAPI_DIRECT_REDUCED, /* of a mechanism less than HAPI_UNSOLVED is left undone, which plain sweeps
+                          would only spoil */
+  HAPI_DIRECT_DEAR     /* an island was too large or too dear for the budget */
+} hapi_direct_end;
+
 typedef struct hapi_solver {
   hapi_row *rows;
   double (*v)[6];    /* in: free velocities, without any row's impulse; out: with all */
@@ -55,14 +63,14 @@ typedef struct hapi_solver {
                          its impulses in v, but for hapi_row_retarget */
   bool owes;  /* in: impulses of triples are not in v yet */
   bool apart; /* in: all rows are single, and no two have a body in common: one sweep solves them */
-  hapi_direct_rest rest;  /* inner */
-  bool too_dear;          /* inner: an island was too large or too dear for the budget */
-  double direct_residual; /* inner: the largest correction due after a direct run, m/s */
-  uint32_t sweeps;        /* out */
-  uint64_t updates;       /* out: row updates, direct solves counted by their cost */
-  uint32_t direct_solves; /* out: that were accepted */
-  double residual;        /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
-  double corrected;       /* inner: J, twice the energy of the last sweep's corrections */
+  hapi_direct_rest rest;      /* inner */
+  hapi_direct_end direct_end; /* inner */
+  double direct_residual;     /* inner: the largest correction due after a direct run, m/s */
+  uint32_t sweeps;            /* out */
+  uint64_t updates;           /* out: row updates, direct solves counted by their cost */
+  uint32_t direct_solves;     /* out: that were accepted */
+  double residual;  /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
+  double corrected; /* inner: J, twice the energy of the last sweep's corrections */
 } hapi_solver;
 
 /* m/s: what is left undone and may add energy; below, asking costs too much */
@@ -150,7 +158,7 @@ double hapi_ball_wanted(const hapi_row *first, double radius, const double error
 double hapi_ball_update(hapi_solver *solver, hapi_row *first);
 
 /* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
- * updates. Sets too_dear and direct_residual. Rows are prepared, v has the impulses. */
+ * updates. Sets direct_end and direct_residual. Rows are prepared, v has the impulses. */
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
 
 /* Whether a responds: j A j^T is 0 only if it does not. */

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "solver/island.h"
+#include "solver/island_reduced.h"
 
 #define INNER_ROUNDS 2 /* active sets tried from one state */
 #define WORSE 30.0     /* how much the largest correction may grow in a round */
@@ -306,6 +307,39 @@ static bool improve_hubs(hapi_island *is, const lists *all, uint16_t first_leaf,
   return better;
 }
 
+/* ---- mechanisms ---- */
+
+/* After rounds that led to nothing: the rows with bounds by themselves, then rounds from the set
+ * that they lead to. Returns the cost in row updates. */
+static uint32_t mechanism_improve(hapi_island *is, uint32_t step, uint32_t budget, double *io_due)
+{
+  hapi_solver *solver = is->solver;
+  const uint32_t cost = INNER_ROUNDS * step;
+  state_keep(is);
+  uint32_t spent = hapi_island_reduce(is, step, budget);
+  double due = spent > 0 ? hapi_island_inspect(is, false) : HUGE_VAL;
+  if (!(due < *io_due)) {
+    go_back(is);
+    return spent;
+  }
+  *io_due = due;
+  ++solver->direct_solves;
+  if (due >= solver->tolerance && cost <= budget - spent) {
+    state_keep(is);
+    spent += cost;
+    (void)island_improve(is, due, false, &due);
+    if (due < *io_due) {
+      *io_due = due;
+    } else {
+      go_back(is);
+    }
+  }
+  if (*io_due < HAPI_UNSOLVED && solver->direct_end != HAPI_DIRECT_DEAR) {
+    solver->direct_end = HAPI_DIRECT_REDUCED;
+  }
+  return spent;
+}
+
 /* ---- all islands ---- */
 
 /* One island; the cost in row updates. */
@@ -327,7 +361,7 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
     return 0;
   }
   if (is->free_rows == 0 || is->free_rows > solver->direct_rows || !hapi_island_gather(is)) {
-    solver->too_dear = solver->too_dear || is->free_rows > 0;
+    solver->direct_end = is->free_rows > 0 ? HAPI_DIRECT_DEAR : solver->direct_end;
     solver->direct_residual = HUGE_VAL;
     return 0;
   }
@@ -337,7 +371,7 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
   hub_state hubs = {.left = budget, .step = step};
   bool has_leaves = leaf != all->last_leaf[index] && solver->hub_count <= HUBS_MAX;
   if (!hapi_island_place(is) || (has_leaves ? step : cost) > budget) {
-    solver->too_dear = true;
+    solver->direct_end = HAPI_DIRECT_DEAR;
   } else if (has_leaves) {
     solver->direct_solves += improve_hubs(is, all, leaf, &hubs, &due);
     spent = budget - hubs.left;
@@ -345,6 +379,9 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
     bool last = 2 * (uint64_t)(budget - cost) <= solver->update_budget;
     solver->direct_solves += island_improve(is, due, last, &due);
     spent = cost;
+    if (due > HAPI_COARSE) {
+      spent += mechanism_improve(is, step, budget - spent, &due);
+    }
   }
   solver->direct_residual = fmax(solver->direct_residual, due);
   return spent;
@@ -355,7 +392,7 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   hapi_island is;
   lists all;
   uint32_t spent = 0;
-  solver->too_dear = false;
+  solver->direct_end = HAPI_DIRECT_DONE;
   solver->direct_residual = HUGE_VAL;
   if (solver->body_count > HAPI_SOLVER_BODIES ||
       solver->work_count < HAPI_ROW_ARRAYS * (size_t)solver->row_count) {

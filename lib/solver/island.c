@@ -450,7 +450,7 @@ static void matrix_factor(hapi_island *is)
 }
 
 /* dv: in right side, out solution */
-static void matrix_substitute(hapi_island *is)
+void hapi_island_substitute(hapi_island *is)
 {
   for (uint32_t k = 0; k < is->count; ++k) {
     uint16_t p = is->pivot[k];
@@ -593,12 +593,17 @@ bool hapi_island_place(hapi_island *is)
   return need <= is->solver->work_count;
 }
 
-/* Impulses of the rows that are free or tied now, cut at their bounds. */
-void hapi_island_solve(hapi_island *is)
+void hapi_island_factor(hapi_island *is)
 {
   matrix_assemble(is);
   matrix_factor(is);
-  matrix_substitute(is);
+}
+
+/* Impulses of the rows that are free or tied now, cut at their bounds. */
+void hapi_island_solve(hapi_island *is)
+{
+  hapi_island_factor(is);
+  hapi_island_substitute(is);
   push_rows(is);
 }
 

@@ -96,6 +96,11 @@ void hapi_island_restore(hapi_island *is);
 /* Impulses of the rows that are free or tied, cut at their bounds, from the saved ones. */
 void hapi_island_solve(hapi_island *is);
 
+/* The two halves of it, without cuts: the matrix, and dv, what the errors of the rows that are free
+ * or tied ask for; then dv out of such a right side. */
+void hapi_island_factor(hapi_island *is);
+void hapi_island_substitute(hapi_island *is);
+
 /* One sweep: where a normal lets go, its frictions go as well, and that shows. */
 void hapi_island_settle(hapi_island *is);
 

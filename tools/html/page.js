@@ -452,7 +452,16 @@ function handThings(stage, run, number, i, share, size) {
 
 // ---- camera, plot, controls ----
 
-// All that moves is framed.
+// Without the few that have rolled or flown away.
+function withoutStrays(balls) {
+  const share = 1 / Math.max(balls.length, 1);
+  const middle = balls.reduce((sum, ball) => add(sum, scaled(ball.place, share)), [0, 0, 0]);
+  const far = balls.map((ball) => norm(sub(ball.place, middle)));
+  const mean = share * far.reduce((sum, x) => sum + x, 0);
+  return balls.filter((ball, i) => far[i] <= 4 * mean + ball.reach);
+}
+
+// What moves is framed.
 function frameAll(run) {
   const least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity];
   const take = (place, reach) => {
@@ -461,15 +470,18 @@ function frameAll(run) {
       most[k] = Math.max(most[k], place[k] + reach);
     }
   };
+  const balls = [];
   const moments = [0, 0.25, 0.5, 0.75, 1].map((x) => run.find(run.begin + x * (run.end - run.begin)));
   for (const [i, share] of moments) {
     for (const geom of scene.geoms) {
       if (geom.body < 0) continue;
       const body = run.body(geom.body, i, share);
-      take(add(body.place, turned(body.turn, geom.pose.slice(0, 3))), geom.reach);
+      const place = add(body.place, turned(body.turn, geom.pose.slice(0, 3)));
+      balls.push({ place, reach: geom.reach });
     }
     scene.pointers.forEach((form, n) => take(run.hand(n, i, share).place, Math.min(form.radius, 1)));
   }
+  withoutStrays(balls).forEach((ball) => take(ball.place, ball.reach));
   if (!(most[0] >= least[0])) take([0, 0, 0], 0.1);
   const middle = scaled(add(least, most), 0.5);
   const size = Math.max(0.5 * norm(sub(most, least)), 1e-3);
