@@ -69,6 +69,7 @@ struct hap_session {
   hap_research_def research;
   hapi_exchange *exchange; /* of the loop, and of physics where there is no other */
   hapi_ferry ferry;
+  hapi_limits limits; /* of all pointers, for a world far away */
   hapi_haptic *haptic;
   hapi_textures *textures;
   hapi_physics *physics;
@@ -139,6 +140,8 @@ typedef struct hapi_far {
  * Errors as above, and HAP_ERROR_MEMORY. */
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
 void hapi_far_finish(hapi_far *far); /* begun before */
+/* Another pointer can do so much more. */
+void hapi_session_allow(hap_session *session, const hapi_pointer_setup *setup);
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */
