@@ -42,7 +42,9 @@ hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
   if (exchange != NULL) {
     hapi_physics_set_exchange(session->physics, exchange);
   }
+  const hapi_limits limits = session->ferry.limits;
   session->ferry = *ferry;
+  session->ferry.limits = limits;
   session->ferry.exchange = exchange;
   const hapi_physics_calls calls = {ferry->of, ferry->before_cycle, ferry->after_cycle};
   hapi_physics_set_calls(session->physics, &calls);
@@ -138,7 +140,7 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
                             .capacity = *hapi_exchange_capacity(session->exchange)};
   far->world.terms = far->loop.terms = terms;
   far->world.terms.limits = (hapi_limits){HAP_CLIENT_FORCE, HAP_CLIENT_SPEED};
-  far->loop.limits = session->limits;
+  far->loop.limits = session->ferry.limits;
   far->world.exchange = apart != NULL ? apart : session->exchange;
   far->world.renew = far_renew;
   far->world.renew_of = session->physics;
@@ -158,12 +160,12 @@ void hapi_session_allow(hap_session *session, const hapi_pointer_setup *setup)
 {
   double felt = setup->force_scale > 0.0 ? setup->max_force / setup->force_scale : 0.0;
   hapi_far *far = session->ferry.far;
-  session->limits.force += hapi_max(felt, REACH_M * setup->stiffness);
-  session->limits.speed =
-      hapi_max(session->limits.speed, HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale);
+  session->ferry.limits.force += hapi_max(felt, REACH_M * setup->stiffness);
+  session->ferry.limits.speed =
+      hapi_max(session->ferry.limits.speed, HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale);
   if (far != NULL) {
     pthread_mutex_lock(&far->lock);
-    far->loop.limits = session->limits;
+    far->loop.limits = session->ferry.limits;
     far->loop.limits_told = false;
     pthread_mutex_unlock(&far->lock);
   }

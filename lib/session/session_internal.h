@@ -50,6 +50,7 @@ typedef struct hapi_ferry {
   void (*before_tick)(void *of, int64_t now_ns);  /* model and near to the loop */
   void (*after_tick)(void *of, int64_t now_ns);   /* the state away from the loop */
   struct hapi_far *far; /* the ends that are the ferry; NULL: something else is */
+  hapi_limits limits;   /* of all pointers, for a world far away; also without a ferry */
   hapi_remote *own;     /* what serve or connect have made; else NULL */
   /* A thread of its own, in drives with threads; stop is idempotent. NULL: it needs none. */
   hap_status (*start)(hap_session *session);
@@ -69,7 +70,6 @@ struct hap_session {
   hap_research_def research;
   hapi_exchange *exchange; /* of the loop, and of physics where there is no other */
   hapi_ferry ferry;
-  hapi_limits limits; /* of all pointers, for a world far away */
   hapi_haptic *haptic;
   hapi_textures *textures;
   hapi_physics *physics;
