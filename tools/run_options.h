@@ -39,9 +39,22 @@ typedef struct run_window_options {
   struct run_stage *stage; /* of the window that is open; NULL: none */
 } run_window_options;
 
+/* A world in another process. */
+typedef struct run_far_options {
+  const char *serve;        /* name of the world; NULL: not */
+  const char *connect;      /* likewise */
+  const char *name;         /* of the hand; NULL: the default */
+  const char *certificates; /* folder; NULL: none */
+  const char *interface_name;
+  const char *peers;
+  int32_t domain; /* negative: the default */
+  bool insecure;
+} run_far_options;
+
 typedef struct run_options {
   run_action action;
   bool json; /* of RUN_DOCTOR */
+  run_far_options far;
   rig_options rig;
   bool strict; /* of a file: what would be left out is refused */
   bool coupling_given;
