@@ -15,8 +15,7 @@ key ca_key.pem
 openssl req -x509 -new -key ca_key.pem -days 2 -subj "/CN=hapode test authority" -out ca.pem
 cat > governance.xml <<'END'
 <?xml version="1.0" encoding="UTF-8"?>
-<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"
-     xsi:noNamespaceSchemaLocation="https://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_governance.xsd">
+<dds>
   <domain_access_rules>
     <domain_rule>
       <domains><id_range><min>0</min><max>230</max></id_range></domains>
@@ -52,8 +51,7 @@ for name in "$@"; do
     -out "$name/certificate.pem" 2>/dev/null
   cat > permissions.xml <<END
 <?xml version="1.0" encoding="UTF-8"?>
-<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"
-     xsi:noNamespaceSchemaLocation="https://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_permissions.xsd">
+<dds>
   <permissions>
     <grant name="$name">
       <subject_name>CN=$name</subject_name>

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""test_dds_processes.py DDS_END CERTIFICATES: links over DDS between processes. Who joins with which
-certificates, what can be read on the way, and that a process that is killed is missed. Packets of
-the loopback interface are read by a socket of this test, which needs rights of root."""
+"""test_dds_processes.py DDS_END CERTIFICATES: links over DDS between processes. Who joins with
+which certificates, what can be read on the way, and that a process that is killed is missed.
+Packets of the loopback interface are read by a socket of this test, which needs rights of root."""
 import os
 import shutil
 import signal
@@ -159,7 +159,8 @@ def main():
         stranger_check("a hand with certificates of another authority does not join",
                        (server, os.path.join(others, "hand")))
         stranger_check("a hand without certificates does not join", (server, "insecure"))
-        stranger_check("a hand with certificates does not join a world without", ("insecure", server))
+        stranger_check("a hand with certificates does not join a world without",
+                       ("insecure", server))
     print(f"1..{POINT}")
 
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: hapode contributors
 # SPDX-License-Identifier: MIT
-"""test_run_far.py HAPODE_RUN CERTIFICATES: hapode-run --serve and --connect as two processes of this
-machine. The force on the simulated hand is held against model single at 1 kHz in lockstep."""
+"""test_run_far.py HAPODE_RUN CERTIFICATES: hapode-run --serve and --connect as two processes of
+this machine. The force on the simulated hand is held against model single at 1 kHz in lockstep."""
 import csv
 import math
 import os
@@ -16,7 +16,7 @@ import time
 RUN, CERTIFICATES = sys.argv[1:3]
 HAND = "virtual:path=0:-0.06/0/0.03;1:-0.06/0/0.03;4:0.1/0/0.03,start=-2"
 SECONDS = 7
-# In lockstep 0.04 %. In real time a hand's path begins some ms off, and a busy machine misses ticks.
+# In lockstep 0.04 %. In real time a hand's path begins some ms off, and ticks are missed.
 ERROR_MOST = 0.05
 MISSED_MOST = 0.02
 POINT = 0
@@ -154,7 +154,8 @@ def main():
     alone = os.path.join(FOLDER, "alone", "hapode-run")
     os.mkdir(os.path.dirname(alone))
     shutil.copy(RUN, alone)
-    run = subprocess.run([alone, "--serve", "a", "--seconds", "0.1"], capture_output=True, text=True)
+    run = subprocess.run([alone, "--serve", "a", "--seconds", "0.1"], capture_output=True,
+                         text=True)
     if run.returncode == 0:
         skip("without the module", "it is installed on this machine")
     else:

@@ -437,13 +437,13 @@ static const option table[] = {
     {"--record", "FILE", "all that enters the run, for --play (docs/recording.md)", take_text,
      offsetof(run_options, record_path), 0, 0},
     {"--record-limit", "MIB", "size at which the recording ends, 0.0625 to 1e6 (default 1024)",
-     take_number, offsetof(run_options, record_limit_mib), 0.0625, 1e6},
+     take_number, offsetof(run_options, recording.limit_mib), 0.0625, 1e6},
     {"--play", "FILE",
      "what --record wrote, once more, bit for bit; says where it is not. Scene,\n"
      "model, rates and hands are those of the file",
      take_text, offsetof(run_options, play_path), 0, 0},
     {"--play-incomplete", NULL, "--play of a file that breaks off: up to there", take_flag,
-     offsetof(run_options, play_incomplete), 0, 0},
+     offsetof(run_options, recording.incomplete), 0, 0},
     {"--rt-priority", "N", "SCHED_FIFO priority of the haptic thread (default 80), 0: none",
      take_priority, 0, 0, 98},
     {"--no-realtime", NULL, "do not ask for real-time rights", take_constant,
@@ -589,10 +589,10 @@ static hap_status check_recording(const run_options *o, hap_detail *detail)
     return options_fail(detail, "--play: the file says what to run; leave out %s",
                         o->not_beside_play);
   }
-  if (o->play_incomplete && o->play_path == NULL) {
+  if (o->recording.incomplete && o->play_path == NULL) {
     return options_fail(detail, "--play-incomplete: only with --play");
   }
-  if (o->record_limit_mib > 0.0 && o->record_path == NULL) {
+  if (o->recording.limit_mib > 0.0 && o->record_path == NULL) {
     return options_fail(detail, "--record-limit: only with --record");
   }
   if (o->record_path != NULL && o->rig.def.drive == HAP_DRIVE_LOCKSTEP) {

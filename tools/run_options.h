@@ -39,6 +39,12 @@ typedef struct run_window_options {
   struct run_stage *stage; /* of the window that is open; NULL: none */
 } run_window_options;
 
+/* Beside the files. */
+typedef struct run_recording_options {
+  double limit_mib; /* of --record; 0: the default */
+  bool incomplete;  /* --play of a file that breaks off */
+} run_recording_options;
+
 /* A world in another process. */
 typedef struct run_far_options {
   const char *serve;        /* name of the world; NULL: not */
@@ -74,9 +80,8 @@ typedef struct run_options {
   run_effects effects;
   bool effects_table; /* why, and what they cost */
   const char *record_path;
-  double record_limit_mib; /* 0: the default */
-  const char *play_path;   /* not NULL: no devices, all from the file */
-  bool play_incomplete;
+  const char *play_path; /* not NULL: no devices, all from the file */
+  run_recording_options recording;
   const char *not_beside_play; /* first option given that the file answers itself; NULL: none */
 } run_options;
 

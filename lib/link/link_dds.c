@@ -87,7 +87,7 @@ static hap_status def_check(const hap_link_dds_def *def, hap_detail *detail)
 /* Beside the code that runs here, which is a library or a program. */
 static bool module_find(char out[PATH_MOST])
 {
-  static const char *const places[] = {"/", "/hapode/", "/../" HAPODE_LIBDIR "/hapode/"};
+  static const char *const places[] = {"/", "/hapode/", "/../" HAPODE_LIBDIR "/hapode/", "/../"};
   static const int here;
   Dl_info info;
   char own[PATH_MOST];
