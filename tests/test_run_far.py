@@ -14,12 +14,12 @@ import tempfile
 import time
 
 RUN, CERTIFICATES = sys.argv[1:3]
-# Pushes the box to the side, then rests on it, 3 mm deep. Ticks are missed in real time, which the
-# force of a push depends on; that of a rest does not.
-HAND = ("virtual:path=0:-0.06/0/0.03;1:-0.06/0/0.03;2:0.01/0/0.03;2.5:-0.06/0/0.03;"
-        "3:0.04/0/0.1;3.5:0.04/0/0.057,start=-1")
+# Rests on the box, 3 mm deep, and then pushes it to the side. Ticks are missed in real time, which
+# the force of a push depends on; that of a rest does not.
+HAND = ("virtual:path=0:0.025/0/0.1;1:0.025/0/0.1;1.5:0.025/0/0.057;3:0.025/0/0.057;"
+        "3.2:0.025/0/0.1;3.4:-0.06/0/0.1;3.6:-0.06/0/0.03;4.5:0.02/0/0.03,start=-1")
 SECONDS = 6
-REST_S = 5.4
+REST_S = (3.0, 3.9)
 ERROR_MOST = 0.02
 POINT = 0
 FOLDER = tempfile.mkdtemp()
@@ -75,8 +75,8 @@ def forces(path):
     """N, the largest of the push, and the mean of the rest."""
     with open(path, newline="") as file:
         rows = [[float(row[k]) for k in ("t", "fx", "fy", "fz")] for row in csv.DictReader(file)]
-    push = max(math.hypot(*row[1:]) for row in rows if row[0] < 3.6)
-    rest = [row[3] for row in rows if row[0] >= REST_S]
+    push = max(math.hypot(*row[1:]) for row in rows if row[0] > 4.5)
+    rest = [row[3] for row in rows if REST_S[0] <= row[0] <= REST_S[1]]
     return push, sum(rest) / len(rest)
 
 
@@ -92,10 +92,13 @@ def pair_check(name, case, how, reference):
            said.get("remote_turned_away") == "0", f"{name}: nothing is refused")
     push, rest = forces(trace)
     wanted = forces(reference)[1]
-    report(push > 1.0 and abs(rest - wanted) <= ERROR_MOST * wanted and wanted > 1.0,
-           f"{name}: the force is that of one process",
-           f"{push:.2f} N to the side, {rest:.3f} N at rest, {wanted:.3f} N in one process; model "
-           f"age {said.get('model_age_s_max')} s, {said.get('missed_ticks')} ticks missed")
+    point = f"{name}: the force is that of one process"
+    if said.get("derated_ticks") != "0":
+        skip(point, "the machine is busy: ticks came late, and the force was lowered")
+    else:
+        report(push > 1.0 and abs(rest - wanted) <= ERROR_MOST * wanted and wanted > 1.0, point,
+               f"{push:.2f} N to the side, {rest:.3f} N at rest, {wanted:.3f} N in one process; model "
+               f"age {said.get('model_age_s_max')} s, {said.get('missed_ticks')} ticks missed")
     left = server.says("the hand has left")
     code, said = server.finish(signal.SIGINT)
     report(left and code == 0 and said.get("remote") == "serves" and
