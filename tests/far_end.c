@@ -114,7 +114,7 @@ static void clock_wait(int64_t until_ns)
   }
 }
 
-static void run(end *e, double seconds)
+static void end_run(end *e, double seconds)
 {
   hap_remote_state state = {0};
   const int64_t start_ns = clock_now();
@@ -173,7 +173,7 @@ int main(int count, char **arguments)
     hand_add(&e);
   }
   session_need(&e, hap_session_start(e.session), "start");
-  run(&e, strtod(arguments[3], NULL));
+  end_run(&e, strtod(arguments[3], NULL));
   hap_session_destroy(e.session);
   hap_link_close(e.link);
   hap_device_close(e.def.device);
