@@ -142,6 +142,7 @@ static void figures_take(remote_run *run, double seconds, const accuracy_motion 
   run->age_s = motion->stats.loop.model_age_max_s;
   run->refused = run->far.world.end.refused + run->far.loop.end.refused;
   run->failed = run->far.world.end.failed + run->far.loop.end.failed;
+  run->bounded = run->far.world.bounded;
   run->old = run->far.world.old + run->far.loop.old;
   run->detail = run->far.world.end.detail.text[0] != '\0' ? run->far.world.end.detail
                                                           : run->far.loop.end.detail;

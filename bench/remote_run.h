@@ -43,6 +43,7 @@ typedef struct remote_run {
   double age_s; /* of a model, the largest */
   uint64_t refused;
   uint64_t failed;
+  uint64_t bounded; /* states that the world's end did not take, as of a hand that does too much */
   uint64_t old;
   hap_detail detail;
 

@@ -46,6 +46,7 @@ int main(void)
       call_fails(NULL, hap_link_local_serve(&server, &why)) ||
       call_fails(NULL, hap_link_local_connect(server, "hand", &path, &path, &client, &why)) ||
       call_fails(world, hap_session_serve(world, server)) ||
+      call_fails(world, hap_session_set_client_limits(world, 150.0, 2.0)) ||
       call_fails(hand, hap_session_connect(hand, client))) {
     return 1;
   }

@@ -58,6 +58,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "servo_loop": "docs/from-chai3d.md",
     "lossy_link": "docs/remote.md",
     "far_hand": "docs/remote.md",
+    "two_processes": "docs/remote.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
 # After the blocks that show parts of a program; a page without it shows all of the program.
@@ -128,6 +129,21 @@ def check_far_hand(program):
     point(len(rows) == 4 and float(rows[3][0]) > 0.12, "the hand pushes the box", out)
     point(len(rows) == 4 and all(float(f) < -0.5 for _, f in rows[2:]), "the hand feels it", out)
     point("round trip 100 ms" in out, "the round trip is that of the network", out)
+
+
+def check_two_processes(program):
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run([str(program.resolve())], cwd=folder, capture_output=True, text=True,
+                              timeout=60)
+    if "hapode-link-dds" in done.stderr:
+        point(done.returncode != 0, "without the module it says what to install", done.stderr)
+        return
+    rows = rows_of(done.stdout, r"^hand at (-?[0-9.]+) m feels (-?[0-9.]+) N$")
+    point(done.returncode == 0 and len(rows) == 7, f"{program.name} runs",
+          done.stderr + done.stdout)
+    point(any(float(f) < -1.0 for _, f in rows), "the hand feels the other process's box",
+          done.stdout)
+    point("joined, " in done.stdout, "it has joined", done.stdout)
 
 
 def check_make_touchable(program):

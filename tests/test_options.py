@@ -30,12 +30,14 @@ BUILDS = {  # name: compiler, options
     "hardening=off": ("gcc", ["-Dhardening=off"]),
     "asserts=disabled": ("gcc", ["-Dasserts=disabled"]),
 }
-OPTIONS = ("serial", "haply", "view", "python", "scene_files", "openxr", "docs", "plots")
+OPTIONS = ("serial", "haply", "view", "python", "scene_files", "openxr", "docs", "plots",
+           "dds")
 BUILDS |= {f"{name}=disabled": ("gcc", [f"-D{name}=disabled"]) for name in OPTIONS}
 # What a build without the option says where it is asked for it; where that can be asked.
 REFUSED = {
     "view=disabled": (["--scene", "row10", "--shot", "x.png"], "meson option view"),
     "haply=disabled": (["--scene", "row10", "--device", "haply"], "built without libwslay"),
+    "dds=disabled": (["--serve", "w", "--seconds", "0.1"], "hapode-link-dds"),
     "scene_files=disabled": (["--scene", "x.urdf"], "built without expat"),
     "plots=disabled": (["--scene", "row10", "--lockstep", "--seconds", "0.1", "--plot", "x.svg"],
                        "no picture"),

@@ -68,7 +68,7 @@ rules() {
     test -s /usr/lib/udev/rules.d/60-hapode-forcedimension.rules
 }
 removes() {
-  apt_get purge libhapode1 libhapode-common libhapode-dev hapode-tools hapode-view \
+  apt_get purge libhapode1 hapode-link-dds libhapode-common libhapode-dev hapode-tools hapode-view \
     python3-hapode
 }
 nothing_left() { ! find /usr /etc /var/lib/dpkg/info -iname '*hapode*' | grep .; }

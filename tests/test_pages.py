@@ -20,7 +20,7 @@ PATH = re.compile(r"`((?:docs|lib(?!/udev)|include|tests|tools|bench|scenes|plug
 # clock.
 NEEDS_MORE = ("spidar", "haply", "forcedimension", "openhaptics", "module:", "replay:", "/",
               "--play", "--identity", "--record", "--tick-share", "--physics-share",
-              "--reconnect", "--shot", "--frames", "--view", "--html")
+              "--reconnect", "--shot", "--frames", "--view", "--html", "--serve", "--connect")
 FILE_ENDS = (".xml", ".urdf")
 # What a piece of code may use; a whole program has a main of its own.
 BEFORE = """#include <hapode/hapode.h>

@@ -85,7 +85,7 @@ static void way_check(bench *b, const accuracy_motion *reference, double beside,
   CHECK(errors.force <= beside + margin_of(run->scene));
   CHECK(errors.torque <= 0.05);
   CHECK(fabs(momentum) < 1e-9 || isnan(momentum)); /* of a hand that moves nothing */
-  CHECK(run->refused == 0 && run->failed == 0);
+  CHECK(run->refused == 0 && run->failed == 0 && run->bounded == 0);
   if (run->detail.text[0] != '\0') {
     printf("# %s\n", run->detail.text);
   }
@@ -212,6 +212,7 @@ TEST(momentum_is_kept_over_a_way_that_loses_doubles_and_reorders)
   CHECK(stats.hand.momentum_error_ns <= 1e-9 * stats.hand.impulse_abs_ns);
   CHECK(stats.faults.states_rejected == 0);
   CHECK(far_ends.world.end.refused == 0 && far_ends.loop.end.refused == 0);
+  CHECK(far_ends.world.bounded == 0);
   tap_release(w);
   hapi_far_finish(&far_ends);
   hap_link_close(far_links[0]);

@@ -414,13 +414,51 @@ TEST(what_does_not_go_over_a_network_is_refused_with_a_text)
   side_create(s, true);
   hap_pointer_def hand;
   hap_pointer_def_init(&hand, sizeof hand);
+  CHECK(hap_session_set_client_limits(s->session, 10.0, 1.0) == HAP_ERROR_STATE);
   CHECK(hap_session_serve(s->session, link) == HAP_OK);
+  CHECK(hap_session_set_client_limits(s->session, 10.0, 1.0) == HAP_OK);
+  const double wrong[] = {-1.0, 1.1e9, (double)NAN, (double)INFINITY};
+  for (int i = 0; i < 4; ++i) {
+    CHECK(hap_session_set_client_limits(s->session, wrong[i], 1.0) == HAP_ERROR_ARGUMENT);
+    CHECK(hap_session_set_client_limits(s->session, 1.0, wrong[i]) == HAP_ERROR_ARGUMENT);
+  }
+  CHECK(hap_session_set_client_limits(NULL, 1.0, 1.0) == HAP_ERROR_ARGUMENT);
   CHECK(hap_pointer_add(s->session, &hand, &s->hand) == HAP_ERROR_STATE);
   CHECK(strstr(side_detail(s), "hap_session_connect") != NULL);
   session_run(s->session);
+  CHECK(hap_session_set_client_limits(s->session, 1.0, 1.0) == HAP_ERROR_STATE);
   CHECK(hap_session_stop(s->session) == HAP_OK);
   CHECK(hap_session_start(s->session) == HAP_ERROR_STATE);
   CHECK(strstr(side_detail(s), "anew") != NULL);
   tap_release(s);
   hap_link_close(link);
+}
+
+/* By the public API alone: a client with a stronger hand than is allowed pushes, and is bounded. */
+TEST(limits_of_a_client_are_counted_and_told_by_the_public_api)
+{
+  side *world = side_new(HAP_DRIVE_LOCKSTEP);
+  side *hand = side_new(HAP_DRIVE_LOCKSTEP);
+  side_create(world, true);
+  side_create(hand, false);
+  side_add_hand(hand);
+  REQUIRE(hap_link_local_serve(&world->link, NULL) == HAP_OK);
+  REQUIRE(hap_link_local_connect(world->link, "", NULL, NULL, &hand->link, NULL) == HAP_OK);
+  REQUIRE(hap_session_serve(world->session, world->link) == HAP_OK);
+  REQUIRE(hap_session_set_client_limits(world->session, 0.01, 0.01) == HAP_OK);
+  REQUIRE(hap_session_connect(hand->session, hand->link) == HAP_OK);
+  session_run(world->session);
+  session_run(hand->session);
+  const hap_pose begin = {{-0.06, 0.0, 0.03}, {1.0, 0.0, 0.0, 0.0}};
+  for (int i = 0; i < 3000; ++i) { /* 1 m/s at the side of the cube: 0.1 J */
+    hap_pose pose = begin;
+    pose.position[0] += i < 500 ? 0.0 : fmin(1e-3 * (i - 500), 0.2);
+    CHECK(hap_pointer_set_target(hand->session, hand->hand, &pose, NULL) == HAP_OK);
+    CHECK(hap_session_advance(hand->session, 1) == HAP_OK);
+    CHECK(hap_session_advance(world->session, 1) == HAP_OK);
+  }
+  hap_remote_state state = side_state(world);
+  CHECK(state.bounded > 0);
+  CHECK(state.turned_away == 0 || side_state(hand).turned_away == 1);
+  CHECK(fabs(dBodyGetLinearVel(world->cube)[0]) < 0.2);
 }

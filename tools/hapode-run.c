@@ -226,6 +226,7 @@ static int run_and_report(run_loop *loop, const run_recording *recording)
     if (loop->options->effects_table) {
       run_effects_table(effects, stdout);
     }
+    run_far_print(loop->far, stdout);
     if (!run_recording_print(recording, loop->options, loop->rig->session, stdout, &detail)) {
       code = usage_complain(EXIT_FAILED, detail.text);
     }
@@ -246,8 +247,9 @@ static double seconds_of(const run_options *options, const rig *r, const run_rec
   }
   return recording->player != NULL
              ? (double)recording->info.ticks / options->rig.def.haptic_hz + 1.0
-         : options->window.wanted ? ENDLESS_S
-                                  : r->scene->parameters.duration;
+         : options->window.wanted     ? ENDLESS_S
+         : options->far.serve != NULL ? ENDLESS_S
+                                      : r->scene->parameters.duration;
 }
 
 static size_t pointers_of(const rig *r, const run_recording *recording)
@@ -265,13 +267,14 @@ static double strips_of(const run_options *options, const run_recording *recordi
                                    : 0.0;
 }
 
-static int run_in(const run_options *options, rig *r, const run_recording *recording)
+static int run_in(const run_options *options, rig *r, run_far *far, const run_recording *recording)
 {
   hap_detail detail = {""};
   run_coupling coupling = {0};
   run_loop loop = {.options = options,
                    .rig = r,
                    .seconds = seconds_of(options, r, recording),
+                   .far = far,
                    .coupling = &coupling,
                    .stage = options->window.stage,
                    .pointers = pointers_of(r, recording)};
@@ -349,10 +352,18 @@ static int run_world(run_options *options, const run_recording *recording)
   run_stage_prepare(options->window.stage, options);
   hap_status status = run_scene_file_open(options, &file, &detail);
   status = status >= HAP_OK ? rig_create(&options->rig, &r, &detail) : status;
-  int code = status < HAP_OK ? run_refuse(&r, status, &detail) : run_in(options, &r, recording);
-  if (status >= HAP_OK) {
+  bool made = status >= HAP_OK;
+  run_far far = {0};
+  if (made) {
+    r.failed = RIG_SESSION; /* what follows says which option it is about */
+    status = run_far_open(options, &r, &far, &detail);
+  }
+  int code =
+      status < HAP_OK ? run_refuse(&r, status, &detail) : run_in(options, &r, &far, recording);
+  if (made) {
     rig_destroy(&r);
   }
+  run_far_close(&far);
   run_scene_file_close(&file);
   dCloseODE();
   return code;

@@ -197,7 +197,8 @@ static hap_status create_session(const rig_options *options, rig *r, hap_detail 
   if (options->player != NULL) {
     (void)hap_player_get_def(options->player, &def, &expert, &research);
   }
-  int32_t own = r->device_count > 0 ? r->scene->parameters.pointers : 0;
+  bool hands_come = r->device_count > 0 || options->serves;
+  int32_t own = hands_come ? r->scene->parameters.pointers : 0;
   int32_t hands = own > (int32_t)r->device_count ? own : (int32_t)r->device_count;
   if (def.max_pointers < hands) {
     def.max_pointers = hands;
@@ -269,6 +270,7 @@ hap_status rig_create(const rig_options *options, rig *out, hap_detail *detail)
   size_t own = (size_t)out->scene->parameters.pointers;
   rig_part part = RIG_SESSION;
   out->device_count = options->player != NULL     ? 0
+                      : options->serves           ? 0
                       : options->device_count > 0 ? options->device_count
                                                   : own;
   status = create_session(options, out, detail);

@@ -53,6 +53,7 @@ typedef struct rig_options {
   hap_player *player; /* not NULL: it plays, with the def and the pointers of the recording */
   hap_integration integration; /* of the pointers */
   const rig_around *around;    /* NULL: none */
+  bool serves;                 /* no pointers: they are in another process */
 } rig_options;
 
 typedef enum rig_part {

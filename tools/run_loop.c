@@ -9,6 +9,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/log.h"
 #include "tools/run_summary.h"
 
 #define PAUSE_S 0.01 /* between two looks at the session */
@@ -215,6 +216,7 @@ static hap_status watch_look(watch *w, double t)
     w->next_sample = t + run_picture_interval(loop->picture) - 0.5 * PAUSE_S;
   }
   show_progress(w, t, &stats);
+  HAPI_TRY(run_far_look(loop->far, w->detail));
   hap_status shown = run_stage_look(loop->stage, t);
   if (shown != HAP_OK) {
     return shown;

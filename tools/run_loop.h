@@ -6,6 +6,7 @@
 /* Lets a session run for its time and takes the trace out of it on the way. */
 
 #include "tools/run_coupling.h"
+#include "tools/run_far.h"
 #include "tools/run_html.h"
 #include "tools/run_options.h"
 #include "tools/run_picture.h"
@@ -26,6 +27,7 @@ typedef struct run_loop {
   run_html *html;       /* NULL: none wanted */
   run_stage *stage;     /* of the window; NULL: there is none */
   run_progress progress;
+  run_far *far;           /* of a world in another process, or a hand */
   run_coupling *coupling; /* filled in on the way */
   size_t pointers;        /* of trace and picture */
 } run_loop;

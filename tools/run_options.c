@@ -9,6 +9,7 @@
 
 #define LATENCY_TICKS_MAX 20000.0
 #define LOOKBACK_SHARE 0.1 /* for --force-error */
+#define LOOK_AHEAD_S 0.1   /* of --serve */
 
 typedef struct option option;
 
@@ -333,6 +334,27 @@ static const option table[] = {
      "model contact: bodies of the loop, so many contacts from the neighbours, 0 to\n"
      "1024, or all that hang together (default: all, from --accuracy 0.2 on)",
      take_range, offsetof(run_options, rig.expert.range_hops), 0, 1024},
+    {"--serve", "WORLD",
+     "the scene's world alone, under that name, for hands of other processes; until Ctrl-C or for\n"
+     "--seconds. --look-ahead: round trip and jitter of the way (default 0.1)",
+     take_text, offsetof(run_options, far.serve), 0, 0},
+    {"--connect", "WORLD",
+     "the scene's hands alone, in the world that another process serves, with the same --scene",
+     take_text, offsetof(run_options, far.connect), 0, 0},
+    {"--hand-name", "NAME", "what the server is told (default hand)", take_text,
+     offsetof(run_options, far.name), 0, 0},
+    {"--certificates", "FOLDER",
+     "of --serve and --connect: over the network, encrypted, with whoever has certificates of the\n"
+     "same authority (docs/remote.md; default: inside this machine)",
+     take_text, offsetof(run_options, far.certificates), 0, 0},
+    {"--insecure", NULL, "likewise over the network, with anybody", take_flag,
+     offsetof(run_options, far.insecure), 0, 0},
+    {"--interface", "NAME", "of the network, by name or address (default: DDS chooses)", take_text,
+     offsetof(run_options, far.interface_name), 0, 0},
+    {"--peers", "LIST", "addresses with commas between them, where there is no multicast",
+     take_text, offsetof(run_options, far.peers), 0, 0},
+    {"--dds-domain", "N", "0 to 230 (default 67)", take_count, offsetof(run_options, far.domain), 0,
+     230},
     {"--seconds", "S", "length of the run (default: the scene's)", take_number,
      offsetof(run_options, seconds), 0.001, 86400},
     {"--lockstep", NULL, "virtual clock, as fast as it goes, reproducible", take_constant,
@@ -415,13 +437,13 @@ static const option table[] = {
     {"--record", "FILE", "all that enters the run, for --play (docs/recording.md)", take_text,
      offsetof(run_options, record_path), 0, 0},
     {"--record-limit", "MIB", "size at which the recording ends, 0.0625 to 1e6 (default 1024)",
-     take_number, offsetof(run_options, record_limit_mib), 0.0625, 1e6},
+     take_number, offsetof(run_options, recording.limit_mib), 0.0625, 1e6},
     {"--play", "FILE",
      "what --record wrote, once more, bit for bit; says where it is not. Scene,\n"
      "model, rates and hands are those of the file",
      take_text, offsetof(run_options, play_path), 0, 0},
     {"--play-incomplete", NULL, "--play of a file that breaks off: up to there", take_flag,
-     offsetof(run_options, play_incomplete), 0, 0},
+     offsetof(run_options, recording.incomplete), 0, 0},
     {"--rt-priority", "N", "SCHED_FIFO priority of the haptic thread (default 80), 0: none",
      take_priority, 0, 0, 98},
     {"--no-realtime", NULL, "do not ask for real-time rights", take_constant,
@@ -567,10 +589,10 @@ static hap_status check_recording(const run_options *o, hap_detail *detail)
     return options_fail(detail, "--play: the file says what to run; leave out %s",
                         o->not_beside_play);
   }
-  if (o->play_incomplete && o->play_path == NULL) {
+  if (o->recording.incomplete && o->play_path == NULL) {
     return options_fail(detail, "--play-incomplete: only with --play");
   }
-  if (o->record_limit_mib > 0.0 && o->record_path == NULL) {
+  if (o->recording.limit_mib > 0.0 && o->record_path == NULL) {
     return options_fail(detail, "--record-limit: only with --record");
   }
   if (o->record_path != NULL && o->rig.def.drive == HAP_DRIVE_LOCKSTEP) {
@@ -701,6 +723,43 @@ static hap_status check_budget(const run_options *o, hap_detail *detail)
              : HAP_OK;
 }
 
+/* What --serve and --connect need and cannot have. */
+static hap_status check_far(run_options *o, hap_detail *detail)
+{
+  const run_far_options *f = &o->far;
+  const char *name = f->serve != NULL ? "--serve" : "--connect";
+  if (f->serve == NULL && f->connect == NULL) {
+    bool any = f->name != NULL || f->certificates != NULL || f->insecure ||
+               f->interface_name != NULL || f->peers != NULL || f->domain >= 0;
+    return any ? options_fail(detail,
+                              "--hand-name, --certificates, --insecure, --interface, "
+                              "--peers, --dds-domain: only with --serve or --connect")
+               : HAP_OK;
+  }
+  if (f->serve != NULL && f->connect != NULL) {
+    return options_fail(detail, "--serve: not with --connect; start two programs");
+  }
+  if (o->rig.def.model != HAP_MODEL_CONTACT || o->rig.def.drive == HAP_DRIVE_LOCKSTEP ||
+      o->record_path != NULL || o->play_path != NULL || o->identify_path != NULL ||
+      o->calibrate_path != NULL || o->check.spec != NULL || o->rig.expert.lookback > 0.0) {
+    return options_fail(detail,
+                        "%s: model contact in real time alone; not with --lockstep, --lookback, "
+                        "--record, --play, --identify, --calibrate or --check-device",
+                        name);
+  }
+  if (f->serve != NULL &&
+      (o->rig.device_count > 0 || o->trace_path != NULL || o->plot_path != NULL ||
+       o->black_box_path != NULL || o->html_path != NULL || o->shot.path != NULL ||
+       o->shot.frames != NULL || o->window.wanted)) {
+    return options_fail(detail, "--serve: hands, traces and pictures are those of --connect");
+  }
+  if (f->serve != NULL && o->rig.expert.look_ahead == 0.0) {
+    o->rig.expert.look_ahead = LOOK_AHEAD_S;
+  }
+  o->rig.serves = f->serve != NULL;
+  return HAP_OK;
+}
+
 /* What only several options together can get wrong. */
 static hap_status options_check(run_options *o, hap_detail *detail)
 {
@@ -739,8 +798,8 @@ static hap_status options_check(run_options *o, hap_detail *detail)
   if (check_shot(o, detail) < HAP_OK || check_html(o, detail) < HAP_OK ||
       check_calibrate(o, detail) < HAP_OK || check_error(o, detail) < HAP_OK ||
       check_budget(o, detail) < HAP_OK || check_recording(o, detail) < HAP_OK ||
-      join_recording(o, detail) < HAP_OK || join_coupling(o, detail) < HAP_OK ||
-      join_friction(o, detail) < HAP_OK) {
+      check_far(o, detail) < HAP_OK || join_recording(o, detail) < HAP_OK ||
+      join_coupling(o, detail) < HAP_OK || join_friction(o, detail) < HAP_OK) {
     return HAP_ERROR_ARGUMENT;
   }
   return run_effects_apply(&o->effects, def->model, &o->rig.expert, &why) < HAP_OK
@@ -755,6 +814,7 @@ hap_status run_options_parse(int argc, char **argv, run_options *out, hap_detail
   rig_options_init(&out->rig);
   out->model_age_s = -1.0;
   out->lookback = -1.0;
+  out->far.domain = -1;
   out->shot = (run_shot_options){.at = -1.0, .size = {1280, 720}};
   run_keys_init(&out->window.keys);
   out->check.force = CONFORM_FORCE_DEFAULT;

@@ -39,9 +39,28 @@ typedef struct run_window_options {
   struct run_stage *stage; /* of the window that is open; NULL: none */
 } run_window_options;
 
+/* Beside the files. */
+typedef struct run_recording_options {
+  double limit_mib; /* of --record; 0: the default */
+  bool incomplete;  /* --play of a file that breaks off */
+} run_recording_options;
+
+/* A world in another process. */
+typedef struct run_far_options {
+  const char *serve;        /* name of the world; NULL: not */
+  const char *connect;      /* likewise */
+  const char *name;         /* of the hand; NULL: the default */
+  const char *certificates; /* folder; NULL: none */
+  const char *interface_name;
+  const char *peers;
+  int32_t domain; /* negative: the default */
+  bool insecure;
+} run_far_options;
+
 typedef struct run_options {
   run_action action;
   bool json; /* of RUN_DOCTOR */
+  run_far_options far;
   rig_options rig;
   bool strict; /* of a file: what would be left out is refused */
   bool coupling_given;
@@ -61,9 +80,8 @@ typedef struct run_options {
   run_effects effects;
   bool effects_table; /* why, and what they cost */
   const char *record_path;
-  double record_limit_mib; /* 0: the default */
-  const char *play_path;   /* not NULL: no devices, all from the file */
-  bool play_incomplete;
+  const char *play_path; /* not NULL: no devices, all from the file */
+  run_recording_options recording;
   const char *not_beside_play; /* first option given that the file answers itself; NULL: none */
 } run_options;
 

@@ -38,7 +38,7 @@ static hap_status read_note(run_recording *r, const char *path, hap_detail *deta
 static hap_status open_player(run_options *options, run_recording *out, hap_detail *detail)
 {
   hap_detail why = {""};
-  hap_play_extent extent = options->play_incomplete ? HAP_PLAY_INCOMPLETE : HAP_PLAY_WHOLE;
+  hap_play_extent extent = options->recording.incomplete ? HAP_PLAY_INCOMPLETE : HAP_PLAY_WHOLE;
   hap_status status = hap_player_open(options->play_path, extent, &out->player, &why);
   if (status < HAP_OK) {
     snprintf(detail->text, sizeof detail->text, "--play %.490s", why.text);
@@ -69,8 +69,8 @@ hap_status run_recording_open(run_options *options, run_recording *out, hap_deta
     out->def.path = options->record_path;
     out->def.note = out->note;
     out->def.note_size = (size_t)size;
-    if (options->record_limit_mib > 0.0) {
-      out->def.max_bytes = (uint64_t)(options->record_limit_mib * 1048576.0);
+    if (options->recording.limit_mib > 0.0) {
+      out->def.max_bytes = (uint64_t)(options->recording.limit_mib * 1048576.0);
     }
     options->rig.record = &out->def;
   }

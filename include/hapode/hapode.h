@@ -16,6 +16,7 @@
 #include <hapode/hooks.h>
 #include <hapode/identify.h>
 #include <hapode/link.h>
+#include <hapode/link_dds.h>
 #include <hapode/outputs.h>
 #include <hapode/pointer.h>
 #include <hapode/pointer_set.h>

@@ -23,9 +23,9 @@ HAP_BEGIN_DECLS
  * start, and without pointers. The link is borrowed: it belongs to the physics thread while the
  * session runs, and is closed after hap_session_destroy. Drives THREADS, FRAME and LOCKSTEP.
  *
- * When the hand's session leaves, its bodies are the world's again. Another one may join then. A
- * session that is served or connected is started once. The impulses of a hand's session are not
- * bounded here: serve only those that are trusted.
+ * When the hand's session leaves, its bodies are the world's again. Another one may join then; one
+ * that comes before is told why it may not. A session that is served or connected is started once.
+ * What a hand's session does to bodies is bounded by hap_session_set_client_limits.
  *
  * HAP_ERROR_ARGUMENT: a NULL. HAP_ERROR_STATE: started already. HAP_ERROR_UNSUPPORTED: another
  * model than CONTACT, looking back, a contact callback, or a session that is recorded or played;
@@ -41,6 +41,19 @@ HAP_NODISCARD HAP_API hap_status hap_session_serve(hap_session *session, hap_lin
  * session is made anew to join again. Errors as above. */
 HAP_NODISCARD HAP_API hap_status hap_session_connect(hap_session *session, hap_link *link);
 
+/* What a hand may be able to do that joins, in the world: a session tells what its pointers can,
+ * and the smaller counts. */
+#define HAP_CLIENT_FORCE 300.0 /* N */
+#define HAP_CLIENT_SPEED 10.0  /* m/s */
+
+/* [control] Other limits than HAP_CLIENT_FORCE and HAP_CLIENT_SPEED for whoever joins a served
+ * session; before start. A hand then gives bodies no more energy than force x speed over the time,
+ * saved up for a second, and no more impulse than force x time, saved up likewise; bodies may pass
+ * on what they have. What a hand's session tells beyond that is not taken, and after a second of it
+ * the session is turned away (docs/remote.md). HAP_ERROR_ARGUMENT: not from 0 to 1e9.
+ * HAP_ERROR_STATE: the session is not served, or was started. */
+HAP_API hap_status hap_session_set_client_limits(hap_session *session, double force, double speed);
+
 /* How a session of hap_session_serve or hap_session_connect goes. It has a size and may grow at its
  * end. */
 typedef struct hap_remote_state {
@@ -53,6 +66,11 @@ typedef struct hap_remote_state {
   double round_trip_s;      /* hand's session: the shortest of the last 16; 0: none yet */
   double clock_ahead_s;     /* hand's session: the world's clock - the session's */
   hap_link_figures figures; /* of the link */
+  /* World's session: messages of the hand's session beyond its limits, which were not taken */
+  uint64_t bounded;
+  /* World's session: hands' sessions that were told why they may not join or stay. Hand's session:
+   * 1: it was told so, and detail says why */
+  uint64_t turned_away;
 } hap_remote_state;
 
 /* [any] HAP_ERROR_ARGUMENT: a NULL, or no room for the size. HAP_ERROR_STATE: the session is

@@ -179,6 +179,14 @@ static hap_status module_load(module *m)
   return status;
 }
 
+hap_status hapi_module_load(const char *path, void **out_library, hap_detail *detail)
+{
+  module m = {.path = path, .detail = detail};
+  HAPI_TRY(module_load(&m));
+  *out_library = m.library;
+  return HAP_OK;
+}
+
 static hap_status module_open(module *m, const char *args, hap_device **out)
 {
   const hap_device_ops *ops = NULL;

@@ -30,7 +30,9 @@ void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of)
     }
     bool theirs = event.kind == HAP_LINK_MESSAGE && end->joined && event.peer == end->peer;
     hap_detail why = {""};
-    if (event.kind == HAP_LINK_MESSAGE && !theirs) {
+    if (event.kind == HAP_LINK_MESSAGE && !theirs && event.peer == end->peer) {
+      ++end->refused; /* it was told to go: why, stays to be read */
+    } else if (event.kind == HAP_LINK_MESSAGE && !theirs) {
       snprintf(why.text, sizeof why.text, "it is of peer %u, who has no part here", event.peer);
       hapi_end_refuse(end, &why);
     } else if (event.kind != HAP_LINK_MESSAGE || event.channel == HAPI_TERMS_CHANNEL ||
@@ -91,4 +93,17 @@ void hapi_end_send_terms(hapi_end *end, const hapi_terms *terms)
   const hap_link_parcel parcel = {
       .to = {.channel = HAPI_TERMS_CHANNEL}, .reliable = 1, .bytes = sizeof bytes, .data = bytes};
   (void)end_post(end, &parcel);
+}
+
+void hapi_end_send_refusal(hapi_end *end, uint32_t peer, const char *text)
+{
+  unsigned char bytes[HAPI_REFUSAL_BYTES_MOST];
+  uint32_t own = end->peer;
+  const hap_link_parcel parcel = {.to = {.channel = HAPI_TERMS_CHANNEL},
+                                  .reliable = 1,
+                                  .bytes = hapi_refusal_write(text, bytes),
+                                  .data = bytes};
+  end->peer = peer;
+  (void)end_post(end, &parcel);
+  end->peer = own;
 }

@@ -37,6 +37,8 @@ void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of);
 void hapi_end_send(hapi_end *end, void *const messages[2]);
 void hapi_end_send_terms(hapi_end *end, const hapi_terms *terms);
 void hapi_end_send_stamps(hapi_end *end, const unsigned char *data, uint32_t bytes);
+/* Tells a peer, of whom nothing is taken, why. */
+void hapi_end_send_refusal(hapi_end *end, uint32_t peer, const char *text);
 /* Counts what hear has not understood. */
 void hapi_end_refuse(hapi_end *end, const hap_detail *why);
 

@@ -68,6 +68,11 @@ static void loop_hear(void *of, const hap_link_event *event)
       snprintf(why.text, sizeof why.text, "it is no answer about the time");
       hapi_end_refuse(&loop->end, &why);
     }
+  } else if (hapi_refusal_read(event->data, event->bytes, &why)) {
+    hapi_log(HAP_LOG_ERROR, "the world does not take this session: %.300s", why.text);
+    loop->turned_away = true;
+    loop->agreed = false;
+    loop->end.detail = why;
   } else {
     hapi_terms terms;
     if (hapi_terms_read(event->data, event->bytes, &terms, &why) < HAP_OK ||
@@ -76,7 +81,7 @@ static void loop_hear(void *of, const hap_link_event *event)
       return;
     }
     loop->terms = terms;
-    loop->agreed = true;
+    loop->agreed = !loop->turned_away;
     loop->next_ns = loop->end.now_ns;
   }
 }
@@ -125,6 +130,12 @@ void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns)
 {
   unsigned char question[HAPI_STAMPS_QUESTION];
   loop->end.now_ns = now_ns;
+  if (loop->agreed && !loop->limits_told) {
+    hapi_terms own = loop->terms;
+    own.limits = loop->limits;
+    hapi_end_send_terms(&loop->end, &own);
+    loop->limits_told = true;
+  }
   if (loop->agreed && hapi_stamps_ask(&loop->stamps, now_ns, question)) {
     hapi_end_send_stamps(&loop->end, question, sizeof question);
   }

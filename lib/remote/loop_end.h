@@ -21,6 +21,9 @@ typedef struct hapi_loop_end {
   hapi_exchange *exchange; /* of the loop */
   bool agreed;             /* terms have come, and are good */
   hapi_terms terms;        /* before: what the loop has */
+  hapi_limits limits;      /* of the session's pointers */
+  bool limits_told;        /* to the world */
+  bool turned_away;        /* by the world, end.detail says why */
   uint64_t number;         /* of the newest model given */
   uint64_t old;            /* models that came behind a newer one */
   int64_t next_ns;         /* when the state is due */

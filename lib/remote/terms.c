@@ -37,8 +37,16 @@ static const terms_room rooms[] = {
 
 #define ROOMS (sizeof rooms / sizeof rooms[0])
 #define ROOMS_AT 40 /* byte of the message */
+#define LIMITS_AT 88
 
-static_assert(ROOMS_AT + 4 * ROOMS <= HAPI_TERMS_BYTES, "the rooms are in the message");
+static_assert(ROOMS_AT + 4 * ROOMS <= LIMITS_AT, "the rooms are in the message");
+static_assert(LIMITS_AT + 16 <= HAPI_TERMS_BYTES, "so are the limits");
+
+/* What a message of channel 0 is. */
+#define KIND_AT 12
+#define KIND_TERMS 0u
+#define KIND_REFUSAL 1u
+#define TEXT_AT 16u
 
 static uint32_t *room_of(hapi_capacity *capacity, size_t index)
 {
@@ -63,12 +71,42 @@ void hapi_terms_write(const hapi_terms *terms, unsigned char out[HAPI_TERMS_BYTE
   for (size_t i = 0; i < ROOMS; ++i) {
     hapi_bytes_write(room_read(&terms->capacity, i), 4, out + ROOMS_AT + 4 * i);
   }
+  hapi_bytes_write_real(terms->limits.force, out + LIMITS_AT);
+  hapi_bytes_write_real(terms->limits.speed, out + LIMITS_AT + 8);
+}
+
+uint32_t hapi_refusal_write(const char *text, unsigned char out[HAPI_REFUSAL_BYTES_MOST])
+{
+  size_t length = strnlen(text, HAPI_REFUSAL_BYTES_MOST - TEXT_AT);
+  memset(out, 0, TEXT_AT);
+  memcpy(out, magic, sizeof magic);
+  hapi_bytes_write(HAPI_TERMS_VERSION, 4, out + 8);
+  hapi_bytes_write(KIND_REFUSAL, 4, out + KIND_AT);
+  memcpy(out + TEXT_AT, text, length);
+  return TEXT_AT + (uint32_t)length;
+}
+
+/* The text is for people, of somebody who is not known: what is no letter is none here. */
+bool hapi_refusal_read(const void *data, uint32_t bytes, hap_detail *out)
+{
+  const unsigned char *in = data;
+  if (bytes <= TEXT_AT || bytes > HAPI_REFUSAL_BYTES_MOST || memcmp(in, magic, sizeof magic) != 0 ||
+      hapi_bytes_read(in + KIND_AT, 4) != KIND_REFUSAL) {
+    return false;
+  }
+  memset(out, 0, sizeof *out);
+  for (uint32_t i = 0; i < bytes - TEXT_AT; ++i) {
+    unsigned char letter = in[TEXT_AT + i];
+    out->text[i] = (char)(letter >= 0x20 && letter < 0x7f ? letter : '?');
+  }
+  return true;
 }
 
 hap_status hapi_terms_read(const void *data, uint32_t bytes, hapi_terms *out, hap_detail *detail)
 {
   const unsigned char *in = data;
-  if (bytes != HAPI_TERMS_BYTES || memcmp(in, magic, sizeof magic) != 0) {
+  if (bytes != HAPI_TERMS_BYTES || memcmp(in, magic, sizeof magic) != 0 ||
+      hapi_bytes_read(in + KIND_AT, 4) != KIND_TERMS) {
     return hapi_fail(detail, HAP_ERROR_FORMAT,
                      "the other end does not speak hapode: %u bytes with another begin", bytes);
   }
@@ -81,7 +119,9 @@ hap_status hapi_terms_read(const void *data, uint32_t bytes, hapi_terms *out, ha
   }
   hapi_terms terms = {.look_ahead_s = hapi_bytes_read_real(in + 16),
                       .period_s = hapi_bytes_read_real(in + 24),
-                      .haptic_hz = hapi_bytes_read_real(in + 32)};
+                      .haptic_hz = hapi_bytes_read_real(in + 32),
+                      .limits = {.force = hapi_bytes_read_real(in + LIMITS_AT),
+                                 .speed = hapi_bytes_read_real(in + LIMITS_AT + 8)}};
   for (size_t i = 0; i < ROOMS; ++i) {
     *room_of(&terms.capacity, i) = (uint32_t)hapi_bytes_read(in + ROOMS_AT + 4 * i, 4);
   }
@@ -91,6 +131,9 @@ hap_status hapi_terms_read(const void *data, uint32_t bytes, hapi_terms *out, ha
                      "the other end looks ahead by %g s and steps by %g s: 0 to %g s and up to %g "
                      "s are possible",
                      terms.look_ahead_s, terms.period_s, HAP_LOOK_AHEAD_MOST, PERIOD_MOST_S);
+  }
+  if (!(terms.limits.force >= 0.0 && terms.limits.speed >= 0.0)) { /* likewise */
+    return hapi_fail(detail, HAP_ERROR_FORMAT, "limits of the other end are below 0");
   }
   *out = terms;
   return HAP_OK;

@@ -6,17 +6,25 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/log.h"
+
+/* So long states beyond the bound are waited out. */
+#define BOUNDED_MOST_NS INT64_C(1000000000)
 
 hap_status hapi_world_end_begin(hapi_world_end *world)
 {
   size_t size = hapi_exchange_message_size(world->exchange, HAPI_CHANNEL_STATE);
   world->store = hapi_alloc(size);
   world->terms.capacity = *hapi_exchange_capacity(world->exchange);
-  return world->store != NULL ? HAP_OK : HAP_ERROR_MEMORY;
+  world->bound.most = world->terms.limits;
+  bool bound = hapi_bound_create(&world->bound, world->terms.capacity.bodies,
+                                 world->terms.look_ahead_s + 2.0 * world->terms.period_s);
+  return world->store != NULL && bound ? HAP_OK : HAP_ERROR_MEMORY;
 }
 
 void hapi_world_end_finish(hapi_world_end *world)
 {
+  hapi_bound_finish(&world->bound);
   hapi_free(world->store);
   world->store = world->last = NULL;
 }
@@ -74,6 +82,9 @@ static void client_join(hapi_world_end *world, uint32_t peer)
 {
   world->end.joined = true;
   world->end.peer = peer;
+  world->admitted = false;
+  world->bounded_ns = 0;
+  hapi_bound_reset(&world->bound, world->end.now_ns);
   world->tick = 0;
   world->end.codec.reset(world->end.codec.self);
   if (world->clients++ > 0) {
@@ -82,26 +93,76 @@ static void client_join(hapi_world_end *world, uint32_t peer)
   hapi_end_send_terms(&world->end, &world->terms);
 }
 
+/* Nothing more is taken of it, and it is told why. */
+static void client_turn_away(hapi_world_end *world, const hap_detail *why)
+{
+  hapi_log(HAP_LOG_WARNING, "the hand's session is turned away: %.300s", why->text);
+  hapi_end_send_refusal(&world->end, world->end.peer, why->text);
+  world->end.joined = world->admitted = false;
+  world->end.detail = *why;
+  ++world->turned_away;
+  loop_let_go(world);
+}
+
+static void client_admit(hapi_world_end *world, const hap_link_event *event)
+{
+  hapi_terms terms;
+  hap_detail why = {""};
+  if (hapi_terms_read(event->data, event->bytes, &terms, &why) < HAP_OK ||
+      hapi_terms_compare(&terms, &world->terms, &why) < HAP_OK) {
+    client_turn_away(world, &why);
+  } else {
+    world->admitted = true;
+    hapi_bound_allow(&world->bound, &terms.limits);
+  }
+}
+
 static void world_hear(void *of, const hap_link_event *event)
 {
   hapi_world_end *world = of;
   hapi_end *end = &world->end;
-  if (event->kind == HAP_LINK_JOINED && !end->joined) {
+  if (event->kind == HAP_LINK_JOINED && end->joined) {
+    ++world->turned_away;
+    hapi_end_send_refusal(end, event->peer,
+                          "the world has a hand's session already, and room for one: make this one "
+                          "anew when the other has left");
+  } else if (event->kind == HAP_LINK_JOINED) {
     client_join(world, event->peer);
   } else if (event->kind == HAP_LINK_LEFT && end->joined && event->peer == end->peer) {
     end->joined = false;
     loop_let_go(world);
+  } else if (event->kind == HAP_LINK_MESSAGE && event->channel == HAPI_TERMS_CHANNEL) {
+    client_admit(world, event);
   } else if (event->kind == HAP_LINK_MESSAGE) {
-    const hap_detail why = {"it is no question for the time, and a client has no terms to tell"};
+    const hap_detail why = {"it is no question for the time"};
     const int64_t times_ns[2] = {event->arrived_ns, end->now_ns};
     unsigned char answer[HAPI_STAMPS_ANSWER];
-    if (event->channel == HAPI_STAMPS_CHANNEL &&
-        hapi_stamps_answer(event->data, event->bytes, times_ns, answer)) {
+    if (hapi_stamps_answer(event->data, event->bytes, times_ns, answer)) {
       hapi_end_send_stamps(end, answer, sizeof answer);
     } else {
       hapi_end_refuse(end, &why);
     }
   }
+}
+
+/* What a client tells is within what its devices can do; one that goes on otherwise is no longer
+ * listened to. */
+static bool state_is_bounded(hapi_world_end *world, hapi_state *state)
+{
+  hap_detail why = {""};
+  if (hapi_bound_take(&world->bound, world->end.now_ns, state, &why)) {
+    world->bounded_ns = 0;
+    return true;
+  }
+  if (world->bounded++ == 0) {
+    hapi_log(HAP_LOG_WARNING, "%.300s", why.text);
+  }
+  world->end.detail = why;
+  world->bounded_ns = world->bounded_ns == 0 ? world->end.now_ns : world->bounded_ns;
+  if (world->end.now_ns - world->bounded_ns > BOUNDED_MOST_NS) {
+    client_turn_away(world, &why);
+  }
+  return false;
 }
 
 void hapi_world_end_receive(hapi_world_end *world, int64_t now_ns)
@@ -118,6 +179,9 @@ void hapi_world_end_receive(hapi_world_end *world, int64_t now_ns)
     return;
   }
   world->tick = state->tick;
+  if (!world->admitted || !state_is_bounded(world, state)) {
+    return;
+  }
   world->last = world->store;
   memcpy(world->last, state, hapi_exchange_message_size(world->exchange, HAPI_CHANNEL_STATE));
   state_give(world, state);
@@ -131,6 +195,9 @@ void hapi_world_end_send(hapi_world_end *world, int64_t now_ns)
   hapi_near *near = hapi_exchange_near_take(world->exchange);
   void *const messages[2] = {model, near};
   world->end.now_ns = now_ns;
+  if (model != NULL) {
+    hapi_bound_note(&world->bound, model);
+  }
   if (model != NULL && near != NULL) {
     hapi_end_send(&world->end, messages);
   }

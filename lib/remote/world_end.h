@@ -4,8 +4,9 @@
 #define HAPODE_REMOTE_WORLD_END_H
 
 /* The world's end of a session whose loop is elsewhere: physics' exchange on one side, the server's
- * link on the other. It has one client at a time; of a second one nothing is taken. */
+ * link on the other. It has one client at a time; a second one is told so. */
 
+#include "remote/bound.h"
 #include "remote/end.h"
 #include "sync/exchange.h"
 
@@ -20,9 +21,15 @@ typedef struct hapi_world_end {
   hapi_state *last;  /* the newest state given, while there is a client; else NULL */
   uint64_t clients;  /* that have joined, one after the other */
   hapi_state *store; /* memory of last */
+  hapi_bound bound;
+  bool admitted;        /* the client has told its terms, and they fit */
+  uint64_t bounded;     /* states beyond the bound */
+  int64_t bounded_ns;   /* since when they come; 0: the newest was within it */
+  uint64_t turned_away; /* clients that were told to go */
 } hapi_world_end;
 
-/* [control] The exchange is set, and with it what messages have room for. HAP_ERROR_MEMORY. */
+/* [control] The exchange is set, and with it what messages have room for; terms are, too.
+ * HAP_ERROR_MEMORY. */
 hap_status hapi_world_end_begin(hapi_world_end *world);
 void hapi_world_end_finish(hapi_world_end *world); /* zeroed allowed */
 

@@ -1,9 +1,13 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "session/session_internal.h"
+#include <hapode/remote.h>
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/pointer_setup.h"
+#include "base/safety.h"
+#include "base/vec.h"
+#include "session/session_internal.h"
 
 /* Physics and loop without memory in common: what one knows of the other comes in messages. */
 
@@ -38,7 +42,9 @@ hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
   if (exchange != NULL) {
     hapi_physics_set_exchange(session->physics, exchange);
   }
+  const hapi_limits limits = session->ferry.limits;
   session->ferry = *ferry;
+  session->ferry.limits = limits;
   session->ferry.exchange = exchange;
   const hapi_physics_calls calls = {ferry->of, ferry->before_cycle, ferry->after_cycle};
   hapi_physics_set_calls(session->physics, &calls);
@@ -133,6 +139,8 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
                             .haptic_hz = def->haptic_hz,
                             .capacity = *hapi_exchange_capacity(session->exchange)};
   far->world.terms = far->loop.terms = terms;
+  far->world.terms.limits = (hapi_limits){HAP_CLIENT_FORCE, HAP_CLIENT_SPEED};
+  far->loop.limits = session->ferry.limits;
   far->world.exchange = apart != NULL ? apart : session->exchange;
   far->world.renew = far_renew;
   far->world.renew_of = session->physics;
@@ -141,6 +149,26 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
   pthread_mutex_init(&far->lock, NULL);
   HAPI_TRY(hapi_world_end_begin(&far->world));
   return hapi_loop_end_begin(&far->loop);
+}
+
+/* ---- what a hand can do ---- */
+
+#define REACH_M 0.1 /* a hand presses a pointer no farther into what does not give way */
+
+/* A body gets what the pointer's spring gives, also where the device gives less to the hand. */
+void hapi_session_allow(hap_session *session, const hapi_pointer_setup *setup)
+{
+  double felt = setup->force_scale > 0.0 ? setup->max_force / setup->force_scale : 0.0;
+  hapi_far *far = session->ferry.far;
+  session->ferry.limits.force += hapi_max(felt, REACH_M * setup->stiffness);
+  session->ferry.limits.speed =
+      hapi_max(session->ferry.limits.speed, HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale);
+  if (far != NULL) {
+    pthread_mutex_lock(&far->lock);
+    far->loop.limits = session->ferry.limits;
+    far->loop.limits_told = false;
+    pthread_mutex_unlock(&far->lock);
+  }
 }
 
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far)

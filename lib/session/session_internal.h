@@ -50,6 +50,7 @@ typedef struct hapi_ferry {
   void (*before_tick)(void *of, int64_t now_ns);  /* model and near to the loop */
   void (*after_tick)(void *of, int64_t now_ns);   /* the state away from the loop */
   struct hapi_far *far; /* the ends that are the ferry; NULL: something else is */
+  hapi_limits limits;   /* of all pointers, for a world far away; also without a ferry */
   hapi_remote *own;     /* what serve or connect have made; else NULL */
   /* A thread of its own, in drives with threads; stop is idempotent. NULL: it needs none. */
   hap_status (*start)(hap_session *session);
@@ -139,6 +140,8 @@ typedef struct hapi_far {
  * Errors as above, and HAP_ERROR_MEMORY. */
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
 void hapi_far_finish(hapi_far *far); /* begun before */
+/* Another pointer can do so much more. */
+void hapi_session_allow(hap_session *session, const hapi_pointer_setup *setup);
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */

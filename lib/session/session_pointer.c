@@ -124,6 +124,9 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
     hapi_quat_normalize(setup.pose_world_device.quat_wxyz);
     status = hapi_haptic_add_pointer(session->haptic, &setup, out, &detail);
   }
+  if (status >= HAP_OK) {
+    hapi_session_allow(session, &setup);
+  }
   return hapi_session_note(session, status, &detail);
 }
 

@@ -83,6 +83,22 @@ hap_status hap_session_connect(hap_session *session, hap_link *link)
   return remote_open(session, link, HAPI_SIDE_LOOP);
 }
 
+hap_status hap_session_set_client_limits(hap_session *session, double force, double speed)
+{
+  HAPI_TRY(hapi_session_may_change(session));
+  if (!(force >= 0.0 && force <= 1e9 && speed >= 0.0 && speed <= 1e9)) { /* false for NaN */
+    return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
+                             "limits of %g N and %g m/s: from 0 to 1e9 are possible", force, speed);
+  }
+  if (session->ferry.own == NULL || session->ferry.side != HAPI_SIDE_WORLD || session->started) {
+    return hapi_session_fail(session, HAP_ERROR_STATE,
+                             "limits are for a session that is served and not started");
+  }
+  hapi_world_end *world = &session->ferry.own->far.world;
+  world->terms.limits = world->bound.most = (hapi_limits){force, speed};
+  return HAP_OK;
+}
+
 /* ---- how it goes ---- */
 
 static void world_tell(const hapi_world_end *world, hap_remote_state *out)
@@ -90,6 +106,8 @@ static void world_tell(const hapi_world_end *world, hap_remote_state *out)
   out->joined = world->end.joined;
   out->joins = world->clients;
   out->look_ahead = world->terms.look_ahead_s;
+  out->bounded = world->bounded;
+  out->turned_away = world->turned_away;
 }
 
 static void loop_tell(const hapi_loop_end *loop, hap_remote_state *out)
@@ -97,6 +115,7 @@ static void loop_tell(const hapi_loop_end *loop, hap_remote_state *out)
   out->joined = loop->end.joined && loop->agreed;
   out->joins = loop->number > 0 || loop->agreed;
   out->look_ahead = loop->terms.look_ahead_s;
+  out->turned_away = loop->turned_away;
   if (loop->stamps.count > 0) {
     int64_t trip_ns;
     out->clock_ahead_s = 1e-9 * (double)hapi_stamps_offset(&loop->stamps, &trip_ns);

@@ -28,7 +28,7 @@ LAYERS = {
     "lib/proximity": ["lib/base"],
     "lib/wire": ["lib/base", "lib/sync", "lib/proximity"],
     "lib/device": ["lib/base"],
-    "lib/link": ["lib/base"],
+    "lib/link": ["lib/base", "lib/device"],
     "lib/remote": ["lib/base", "lib/sync", "lib/wire"],
     "lib/solver": ["lib/base"],
     "lib/pointer": ["lib/base", "lib/sync"],
@@ -67,7 +67,8 @@ ODE_USERS = [folder + "/*" for folder in PHYSICS_SIDE] + [
     "tools/*"]
 HAPODE_ODE_USERS = ODE_USERS + ["lib/session/*ode*.c"]
 
-MODULES = ("plugins/skeleton/",)  # no part of the library: a heap of their own, no header of lib/
+# no part of the library: a heap of their own, no header of lib/
+MODULES = ("plugins/skeleton/", "plugins/dds/")
 
 QUITTERS = ("lib/base/assert.c",        # a mistake of this library, in builds with asserts
             "plugins/spidar/guard.c")  # forks a process of its own, which ends

@@ -17,7 +17,8 @@ OTHER = re.compile(r"^typedef (?!struct \w+ \{|enum \w+ \{)[^;]*?\b(\w+)(?:\)\([
 MACRO = re.compile(r"^#define (\w+)", re.M)
 OPAQUE = re.compile(r"^typedef struct (\w+) \1;", re.M)
 DIRECTIVES = re.compile(r"(^#(?:if|ifdef|ifndef|else|define)\b.*(?:\\\n.*)*\n)+\Z", re.M)
-OF_MODULES = {"hapode_device_module"}  # a module has it, the library looks it up there
+# A module has it, the library looks it up there.
+OF_MODULES = {"hapode_device_module", "hapode_link_dds_module"}
 SELF_EVIDENT = re.compile(r"^HAPODE_\w+_H$|^HAP_(BEGIN|END)_DECLS$")
 
 

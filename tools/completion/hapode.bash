@@ -25,7 +25,7 @@ _hapode() {
         --device | --check-device) words=$(_hapode_section "$program" devices) ;;
         --identity | --identify | --calibrate | --trace | --plot | --html | --shot | \
           --frames | \
-          --black-box | --record | --play | --play-incomplete)
+          --black-box | --record | --play | --play-incomplete | --certificates)
           mapfile -t COMPREPLY < <(compgen -f -- "$word")
           return ;;
         *) words=$(_hapode_options "$program") ;;

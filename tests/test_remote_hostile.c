@@ -1,0 +1,327 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Hands' sessions that tell of more than a hand can do, and those that come when the world has one;
+ * and that the bound on them lets pass what moves hard without a hand. */
+
+#include "tests/tap.h"
+
+#include "tests/far_rig.h"
+#include "tests/logged.h"
+
+#define CUBE 0.2        /* kg */
+#define FORCE 100.0     /* N: 0.1 m of the pointer's 1000 N/m */
+#define SPEED 10.0      /* m/s */
+#define SAVED_S 0.1     /* s */
+#define TURN_AWAY_S 1.0 /* s */
+
+/* ---- a codec that lies ---- */
+
+typedef enum lie {
+  LIE_NONE,
+  LIE_IMPULSE,
+  LIE_MOMENT,
+  LIE_INFINITE,
+  LIE_SPEED,
+  LIE_SPIN,
+  LIE_PLACE,
+  LIE_GROWTH,
+  LIE_LEFT,
+  LIE_SLOW,
+  LIE_NEXT /* of bodies that are not known yet */
+} lie;
+
+typedef struct liar {
+  hapi_codec inner;
+  lie kind;
+  double growth;
+  int64_t left_ns;
+} liar;
+
+static void body_lie(liar *l, hapi_state *state, hapi_state_body *io)
+{
+  const uint32_t owned = HAPI_BODY_OWNED;
+  bool flies = l->kind == LIE_SPEED || l->kind == LIE_SPIN || l->kind == LIE_PLACE ||
+               l->kind == LIE_GROWTH || l->kind == LIE_SLOW;
+  io->flags = flies ? io->flags | owned : io->flags & ~owned;
+  io->impulse[0] += l->kind == LIE_IMPULSE ? 1e9 : l->kind == LIE_INFINITE ? HUGE_VAL : 0.0;
+  io->angular_impulse[2] += l->kind == LIE_MOMENT ? 1e9 : 0.0;
+  io->twist.linear[0] = l->kind == LIE_SPEED ? 1e6 : l->kind == LIE_SLOW ? 1.0 : l->growth;
+  io->twist.angular[2] += l->kind == LIE_SPIN ? 1e6 : 0.0;
+  io->pose.position[0] += l->kind == LIE_PLACE ? 1e3 : 0.0;
+  state->time_scale = l->kind == LIE_SLOW ? 1e-9 : state->time_scale;
+  if (l->kind == LIE_LEFT) {
+    io->owned_until_ns = l->left_ns = l->left_ns + 1000000;
+    io->owned_pose = io->pose;
+    io->owned_twist = (hap_twist){{0.0, 1e6, 0.0}, {0.0, 0.0, 1e6}};
+  }
+  if (l->kind == LIE_NEXT) {
+    ++io->generation;
+    io->impulse[0] = 1e9;
+  }
+}
+
+static hap_status liar_send(void *self, void *const messages[2], const hapi_codec_out *out,
+                            hap_detail *detail)
+{
+  liar *l = self;
+  hapi_state *state = messages[0];
+  l->growth = l->kind == LIE_GROWTH ? fmax(1.1 * l->growth, 0.1) : 0.0;
+  for (uint32_t i = 0; i < state->body_high && l->kind != LIE_NONE; ++i) {
+    if (hapi_state_bodies(state)[i].generation != 0) {
+      body_lie(l, state, &hapi_state_bodies(state)[i]);
+    }
+  }
+  return l->inner.send(l->inner.self, messages, out, detail);
+}
+
+static hap_status liar_take(void *self, const hap_link_event *event, hap_detail *detail)
+{
+  liar *l = self;
+  return l->inner.take(l->inner.self, event, detail);
+}
+
+static bool liar_give(void *self, void *const messages[2])
+{
+  liar *l = self;
+  return l->inner.give(l->inner.self, messages);
+}
+
+static void liar_reset(void *self)
+{
+  liar *l = self;
+  l->inner.reset(l->inner.self);
+}
+
+static void client_make_liar(client *c, liar *l, lie kind)
+{
+  hapi_codec *codec = &c->far.loop.end.codec;
+  *l = (liar){.inner = *codec, .kind = kind, .left_ns = 1000000};
+  *codec = (hapi_codec){l, liar_send, liar_take, liar_give, liar_reset};
+}
+
+/* ---- what bodies do, by ODE's figures ---- */
+
+static double cube_energy(const server *s)
+{
+  const dReal *v = dBodyGetLinearVel(s->cube);
+  const dReal *w = dBodyGetAngularVel(s->cube);
+  const double inertia = CUBE * 0.05 * 0.05 / 6.0;
+  return 0.5 * CUBE * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) +
+         0.5 * inertia * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+}
+
+typedef struct lie_case {
+  const char *name;
+  lie kind;
+} lie_case;
+
+static const lie_case lies[] = {
+    {"impulse", LIE_IMPULSE}, {"moment", LIE_MOMENT}, {"infinite", LIE_INFINITE},
+    {"speed", LIE_SPEED},     {"spin", LIE_SPIN},     {"place", LIE_PLACE},
+    {"growth", LIE_GROWTH},   {"left", LIE_LEFT},     {"slow motion", LIE_SLOW},
+    {"next", LIE_NEXT},
+};
+
+/* With a telling of nothing but 1e9 N s, 1e6 m/s or a speed that grows by a tenth in each message,
+ * the cube gets no more than the pointer can give. Then another hand has the world. */
+TEST_EACH(lies, const lie_case *row)
+{
+  server *s = server_open();
+  client *c = client_open(s, "liar", 1000.0, 8);
+  liar l;
+  double most = 0.0;
+  double farthest = 0.0;
+  client_put(c, 0.0, 0.07, 0.0);
+  ends_run(s, c, 600); /* an honest begin: it knows the cube */
+  logged[0] = '\0';
+  log_listen(true);
+  client_make_liar(c, &l, row->kind);
+  for (int i = 0; i < 3000; ++i) {
+    ends_run(s, c, 1);
+    double energy = cube_energy(s) - FORCE * SPEED * (SAVED_S + 1e-3 * i);
+    const dReal *at = dBodyGetPosition(s->cube);
+    most = fmax(most, energy);
+    farthest = fmax(farthest, hypot(at[0], at[1]));
+    REQUIRE(isfinite(at[0]) && isfinite(energy));
+  }
+  log_listen(false);
+  const hapi_world_end *world = &s->far.world;
+  printf("# %s: %llu not taken, %.3g J over the bound, %.3g m away\n", row->name,
+         (unsigned long long)world->bounded, most, farthest);
+  CHECK(most <= 1e-3);
+  CHECK(farthest < 200.0);
+  if (row->kind != LIE_NEXT) {
+    CHECK(world->bounded > 5 && world->turned_away == 1 && !world->end.joined);
+    CHECK(strstr(logged, "its device can") != NULL);
+    CHECK(c->far.loop.turned_away && strstr(c->far.loop.end.detail.text, "its device") != NULL);
+  }
+  tap_release(c);
+  ends_run(s, NULL, 300);
+  dBodySetPosition(s->cube, 0.0, 0.0, 0.025);
+  dBodySetLinearVel(s->cube, 0.0, 0.0, 0.0);
+  dBodySetAngularVel(s->cube, 0.0, 0.0, 0.0);
+  const dQuaternion upright = {1.0, 0.0, 0.0, 0.0};
+  dBodySetQuaternion(s->cube, upright);
+  CHECK_NEAR(hand_press(s, client_open(s, "honest", 1000.0, 8)), 3.0, 0.02);
+  CHECK(world->end.joined);
+}
+
+/* A device that tells 1e9 N may do what the server allows, and no more. */
+TEST(the_smaller_of_told_and_allowed_limits_counts)
+{
+  server *s = server_open();
+  client *c = client_open(s, "strong", 1000.0, 8);
+  s->far.world.bound.most = (hapi_limits){2.0, 1.0};
+  c->far.loop.limits = (hapi_limits){1e9, 1e9};
+  ends_run(s, c, 300);
+  CHECK(s->far.world.admitted);
+  CHECK(s->far.world.bound.limits.force == 2.0 && s->far.world.bound.limits.speed == 1.0);
+}
+
+/* ---- honest ones: heavy bodies that fall, jump, are driven and edited near a hand ---- */
+
+static bool bouncy_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  (void)user;
+  (void)a;
+  (void)b;
+  *io = (dSurfaceParameters){
+      .mode = dContactApprox1 | dContactBounce, .mu = 0.5, .bounce = 0.9, .bounce_vel = 0.01};
+  return true;
+}
+
+static void honest_check(const server *s)
+{
+  CHECK(s->far.world.end.joined && s->far.world.admitted);
+  CHECK(s->far.world.bounded == 0 && s->far.world.turned_away == 0);
+  if (s->far.world.end.detail.text[0] != '\0') {
+    printf("# %s\n", s->far.world.end.detail.text);
+  }
+}
+
+TEST(heavy_bodies_that_fall_and_jump_are_within_the_bound)
+{
+  server *s = server_open_with(bouncy_surface);
+  client *c = client_open(s, "hand", 1000.0, 8);
+  for (int i = 0; i < 4; ++i) {
+    double mass = pow(10.0, i);
+    dBodyID body =
+        ode_box(s->world, s->space, mass, AT(0.1, 0.1, 0.1), AT(0.15 * i - 0.2, 0.15, 2.0 + i));
+    dBodySetAngularVel(body, 1.0, 2.0, 3.0);
+  }
+  for (int i = 0; i < 8000; ++i) {
+    client_put(c, 0.1 * sin(3e-3 * i), 0.06 + 0.02 * sin(5e-3 * i), 0.3 * cos(3e-3 * i));
+    ends_run(s, c, 1);
+  }
+  honest_check(s);
+}
+
+/* A kinematic bat of 2 m/s hits 5 kg again and again. */
+TEST(what_driven_bodies_hit_is_within_the_bound)
+{
+  server *s = server_open_with(bouncy_surface);
+  client *c = client_open(s, "hand", 1000.0, 8);
+  dBodyID ball = ode_box(s->world, s->space, 5.0, AT(0.1, 0.1, 0.1), AT(0.4, 0.0, 0.05));
+  dBodyID bat = ode_box(s->world, s->space, 1.0, AT(0.1, 0.6, 0.6), AT(0.8, 0.0, 0.3));
+  dBodySetKinematic(bat);
+  client_put(c, 0.0, 0.057, 0.0);
+  for (int i = 0; i < 6000; ++i) {
+    dBodySetLinearVel(bat, -2.0 * cos(6.283e-3 * i), 0.0, 0.0);
+    ends_run(s, c, 1);
+    if (i % 2000 == 1999) {
+      dBodySetPosition(ball, 0.3, 0.0, 0.3);
+      dBodySetLinearVel(ball, -3.0, 0.0, 0.0);
+    }
+  }
+  honest_check(s);
+}
+
+/* The application throws the cube at the hand with 30 m/s, and carries 50 kg up by a force. */
+TEST(what_the_application_does_is_within_the_bound)
+{
+  server *s = server_open();
+  client *c = client_open(s, "hand", 1000.0, 8);
+  dBodyID lifted = ode_box(s->world, s->space, 50.0, AT(0.1, 0.1, 0.1), AT(-0.2, 0.0, 0.05));
+  client_put(c, 0.0, 0.057, 0.0);
+  for (int i = 0; i < 6000; ++i) {
+    if (i % 1500 == 700) {
+      dBodySetPosition(s->cube, 2.0, 0.0, 0.06);
+      dBodySetLinearVel(s->cube, -30.0, 0.0, 0.0);
+    }
+    dBodyAddForce(lifted, 0.0, 0.0, 520.0);
+    ends_run(s, c, 1);
+  }
+  honest_check(s);
+}
+
+/* A second without any state: what the hand gave meanwhile comes at once. */
+TEST(an_outage_of_a_second_is_within_the_bound)
+{
+  server *s = server_open();
+  client *c = client_open(s, "hand", 1000.0, 8);
+  hap_link_path_def cut;
+  hap_link_path_def_init(&cut, sizeof cut);
+  cut.delay = 0.5 * ROUND_TRIP;
+  const hap_link_path_def good = cut;
+  CHECK_NEAR(hand_press(s, c), 3.0, 0.02);
+  cut.loss = 1.0;
+  CHECK(hap_link_local_set_paths(c->clock.inner, &cut, &good) == HAP_OK);
+  for (int i = 0; i < 1000; ++i) { /* to the side, with the cube */
+    client_put(c, 3e-4 * i, 0.057, 0.3);
+    ends_run(s, c, 1);
+  }
+  CHECK(hap_link_local_set_paths(c->clock.inner, &good, &good) == HAP_OK);
+  ends_run(s, c, 500);
+  printf("# the cube is at %.3f m\n", dBodyGetPosition(s->cube)[0]);
+  CHECK(dBodyGetPosition(s->cube)[0] > 0.1);
+  honest_check(s);
+}
+
+/* ---- those that come second ---- */
+
+TEST(a_second_hand_is_told_that_the_world_has_one)
+{
+  server *s = server_open();
+  client *c = client_open(s, "hand", 1000.0, 8);
+  ends_run(s, c, 300);
+  client *second = client_open(s, "other", 1000.0, 8);
+  for (int i = 0; i < 500; ++i) {
+    ends_run(s, c, 1);
+    CHECK(hap_session_advance(second->session, 1) == HAP_OK);
+  }
+  CHECK(second->far.loop.turned_away && !second->far.loop.agreed);
+  CHECK(strstr(second->far.loop.end.detail.text, "has a hand's session already") != NULL);
+  CHECK(s->far.world.turned_away == 1 && s->far.world.end.joined);
+  CHECK_NEAR(hand_press(s, c), 3.0, 0.02);
+  hap_link *same;
+  hap_detail why;
+  CHECK(hap_link_local_connect(s->link, "hand", NULL, NULL, &same, &why) == HAP_ERROR_STATE);
+}
+
+TEST(a_refusal_is_text_and_nothing_else_is_one)
+{
+  unsigned char bytes[HAPI_REFUSAL_BYTES_MOST + 1];
+  hap_detail text;
+  uint32_t size = hapi_refusal_write("no\nroom", bytes);
+  REQUIRE(hapi_refusal_read(bytes, size, &text));
+  CHECK(strcmp(text.text, "no?room") == 0);
+  hapi_terms terms;
+  CHECK(hapi_terms_read(bytes, size, &terms, &text) == HAP_ERROR_FORMAT);
+  for (uint32_t i = 0; i <= 16; ++i) {
+    CHECK(!hapi_refusal_read(bytes, i, &text));
+  }
+  CHECK(!hapi_refusal_read(bytes, HAPI_REFUSAL_BYTES_MOST + 1, &text));
+  bytes[0] ^= 1;
+  CHECK(!hapi_refusal_read(bytes, size, &text));
+  char longest[1000];
+  memset(longest, 'a', sizeof longest - 1);
+  longest[sizeof longest - 1] = '\0';
+  size = hapi_refusal_write(longest, bytes);
+  CHECK(size == HAPI_REFUSAL_BYTES_MOST && hapi_refusal_read(bytes, size, &text));
+  CHECK(strlen(text.text) == HAPI_REFUSAL_BYTES_MOST - 16);
+  const hapi_terms good = {.look_ahead_s = 0.25, .period_s = 0.02, .haptic_hz = 1000.0};
+  unsigned char told[HAPI_TERMS_BYTES];
+  hapi_terms_write(&good, told);
+  CHECK(!hapi_refusal_read(told, sizeof told, &text));
+}
