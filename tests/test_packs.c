@@ -457,7 +457,7 @@ TEST(packs_that_no_longer_hold_are_made_anew)
     rows_ready(&one, hapi_contact_ready, hapi_row_ready);
     hapi_solver_run(&one.solver);
     memcpy(two.rows, one.rows, sizeof one.rows);
-    two.solver.packs.made = one.solver.packs.made;
+    two.solver.packs.known.made = one.solver.packs.known.made;
     for (int i = 0; i < 2; ++i) {
       problem *p = i == 0 ? &one : &two;
       for (uint32_t k = 0; k < 3; ++k) {

@@ -98,7 +98,8 @@ def pair_check(name, case, how, reference):
     else:
         report(push > 1.0 and abs(rest - wanted) <= ERROR_MOST * wanted and wanted > 1.0, point,
                f"{push:.2f} N to the side, {rest:.3f} N at rest, {wanted:.3f} N in one "
-               f"process; model age {said.get('model_age_s_max')} s, {said.get('missed_ticks')} ticks missed")
+               f"process; model age {said.get('model_age_s_max')} s, "
+               f"{said.get('missed_ticks')} ticks missed")
     left = server.says("the hand has left")
     code, said = server.finish(signal.SIGINT)
     report(left and code == 0 and said.get("remote") == "serves" and

@@ -90,7 +90,7 @@ static void join_triple(hapi_solver *solver, uint32_t last)
                r[1].inverse != 0.0 && r[2].inverse != 0.0;
   if (joins) {
     r->triple = HAPI_TRIPLE_ANY;
-    r->made = ++solver->packs.made;
+    r->made = ++solver->packs.known.made;
     r[1].coupling[0] = rows_couple(&r[1], &r[0]);
     r[2].coupling[0] = rows_couple(&r[2], &r[0]);
     r[2].coupling[1] = rows_couple(&r[2], &r[1]);
@@ -157,7 +157,7 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, boo
     bool packable = by_mass && hapi_row_moves_a(r) && r[0].lo == 0.0 && r[0].hi == HUGE_VAL &&
                     r[1].mu + r[2].mu < HUGE_VAL;
     r->triple = r->triple && packable ? HAPI_TRIPLE_BY_MASS : r->triple;
-    solver->packs.ready += r->triple == HAPI_TRIPLE_BY_MASS;
+    solver->packs.known.ready += r->triple == HAPI_TRIPLE_BY_MASS;
   }
   for (uint32_t i = 0; i < count; ++i) {
     if (r->triple) {
@@ -301,7 +301,7 @@ void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count)
     }
   }
   if (r->triple) {
-    solver->packs.ready += r->triple == HAPI_TRIPLE_BY_MASS;
+    solver->packs.known.ready += r->triple == HAPI_TRIPLE_BY_MASS;
     solver->owes = true;
     return;
   }

@@ -100,7 +100,7 @@ void hapi_solver_calm(hapi_solver *solver);
 static inline void hapi_solver_clear(hapi_solver *solver)
 {
   solver->row_count = 0;
-  solver->packs.ready = 0;
+  solver->packs.known.ready = 0;
   solver->owes = false;
 }
 
@@ -124,7 +124,7 @@ void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count);
 /* [haptic] Rows of the last run are in another place than there. */
 static inline void hapi_contact_moved(hapi_solver *solver)
 {
-  ++solver->packs.made;
+  ++solver->packs.known.made;
 }
 
 /* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */

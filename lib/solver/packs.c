@@ -295,15 +295,17 @@ static void packs_set_impulses(const hapi_packs *packs, const hapi_row *rows)
 /* Whether no row was made, went or moved. */
 static bool packs_stand(const hapi_packs *packs, uint32_t row_count, uint32_t body_count)
 {
-  return packs->count > 0 && packs->filled == packs->made && packs->held == packs->ready &&
-         packs->row_count == row_count && packs->body_count == body_count;
+  return packs->count > 0 && packs->known.filled == packs->known.made &&
+         packs->known.held == packs->known.ready && packs->known.row_count == row_count &&
+         packs->known.body_count == body_count;
 }
 
 /* Whether what may be packed is what it was, in the same places. */
 static bool packs_hold(const hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
                        uint32_t body_count)
 {
-  if (packs->count == 0 || packs->row_count != row_count || packs->body_count != body_count) {
+  if (packs->count == 0 || packs->known.row_count != row_count ||
+      packs->known.body_count != body_count) {
     return false;
   }
   for (uint32_t i = 0; i < packs->packable_count; ++i) {
@@ -327,7 +329,7 @@ static bool packs_hold(const hapi_packs *packs, const hapi_row *rows, uint32_t r
 /* Whether four at once are quicker than one by one. */
 static bool packs_pay(const hapi_packs *packs)
 {
-  uint32_t packed = (packs->row_count - packs->loose_rows) / 3;
+  uint32_t packed = (packs->known.row_count - packs->loose_rows) / 3;
   return packs->count > 0 && packed >= FULL_LEAST * packs->contact_count;
 }
 
@@ -343,8 +345,8 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
     return true;
   }
   if (!packs_hold(packs, rows, row_count, body_count)) {
-    packs->row_count = row_count;
-    packs->body_count = body_count;
+    packs->known.row_count = row_count;
+    packs->known.body_count = body_count;
     packs->count = 0;
     units_find(packs, rows, row_count);
     if (packs->packable_count < PACKABLE_LEAST) {
@@ -364,8 +366,8 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
     }
   }
   packs_fill(packs, rows);
-  packs->filled = packs->made;
-  packs->held = packs->ready;
+  packs->known.filled = packs->known.made;
+  packs->known.held = packs->known.ready;
   return true;
 }
 
@@ -388,5 +390,5 @@ void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows)
 void hapi_packs_forget(hapi_packs *packs)
 {
   packs->count = packs->contact_count = packs->packable_count = 0;
-  packs->loose_count = packs->loose_rows = packs->row_count = packs->body_count = 0;
+  packs->loose_count = packs->loose_rows = packs->known.row_count = packs->known.body_count = 0;
 }

@@ -85,6 +85,16 @@ typedef struct hapi_pack_work {
   void (*way_go_on)(double *now, double *begin, double *way, double share, size_t count);
 } hapi_pack_work;
 
+/* What is known of the rows. */
+typedef struct hapi_packed_rows {
+  uint64_t made;      /* see hapi_row, the last one; counts also rows that went to another place */
+  uint64_t filled;    /* the last one when the packs were filled, */
+  uint32_t ready;     /* contacts that may be packed, of the rows so far */
+  uint32_t held;      /* and when the packs were filled */
+  uint32_t row_count; /* all rows, when the packs were made */
+  uint32_t body_count;
+} hapi_packed_rows;
+
 typedef struct hapi_packs {
   const hapi_pack_work *work; /* NULL: nothing is packed */
   hapi_pack *of;              /* contact_capacity, as the next four */
@@ -106,14 +116,9 @@ typedef struct hapi_packs {
   uint32_t unit_count;
   uint32_t loose_count;
   uint32_t loose_rows;
-  uint32_t height;    /* the highest level */
-  bool in_use;        /* the impulses of packed rows are here */
-  uint64_t made;      /* see hapi_row, the last one; counts also rows that went to another place */
-  uint64_t filled;    /* the last one when the packs were filled, */
-  uint32_t ready;     /* contacts that may be packed, of the rows so far */
-  uint32_t held;      /* and when the packs were filled */
-  uint32_t row_count; /* all rows, when the packs were made */
-  uint32_t body_count;
+  uint32_t height; /* the highest level */
+  bool in_use;     /* the impulses of packed rows are here */
+  hapi_packed_rows known;
 } hapi_packs;
 
 extern const hapi_pack_work hapi_pack_work_pairs;       /* on every processor */
