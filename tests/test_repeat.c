@@ -239,7 +239,7 @@ static void run_case(repeat_log *log, const void *arg)
     repeat_note(log, s.w.session);
   }
   hap_stats stats = cw_stats(&s.w);
-  CHECK(status == HAP_OK && stats.loop.contact_ticks > 100 && stats.faults.count == 0);
+  CHECK(status == HAP_OK && stats.loop.contact_ticks > 50 && stats.faults.count == 0);
   CHECK(stats.faults.bodies_lost == 0 && stats.model.range_bodies == 2);
   CHECK(c->lookback == 0.0 || (stats.error.lookbacks > 0 && stats.error.spoilt > 0));
   cw_close(&s.w);
