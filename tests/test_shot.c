@@ -175,12 +175,22 @@ static int yellows_of(const picture *p)
   return count;
 }
 
+/* In real time, which a machine with other work may not keep: then once more, and again. */
+static bool recording_make(const char *what, const char *path)
+{
+  bool made = false;
+  for (int i = 0; i < 3 && !made; ++i) {
+    made = run("%s --no-realtime --record %s", what, path) == 0;
+  }
+  return made;
+}
+
 TEST(a_recording_shows_where_it_was_touched)
 {
   drawing_require();
   const char *recording = path_keep("run.rec");
   const char *path = path_keep("played.png");
-  REQUIRE(run("--scene field --seconds 2 --no-realtime --record %s", recording) == 0);
+  REQUIRE(recording_make("--scene field --seconds 2", recording));
   REQUIRE(run("--play %s --shot-size 640x360 --shot %s", recording, path) == 0);
   picture p = picture_read(path);
   CHECK_SAY(yellows_of(&p) > 50, "%d", yellows_of(&p));
@@ -191,7 +201,7 @@ TEST(a_recording_has_pictures)
   drawing_require();
   const char *recording = path_keep("run.rec");
   const char *path = path_keep("played.png");
-  REQUIRE(run("--scene row10:3 --seconds 0.8 --no-realtime --record %s", recording) == 0);
+  REQUIRE(recording_make("--scene row10:3 --seconds 0.8", recording));
   REQUIRE(run("--play %s --shot-size 640x360 --shot %s", recording, path) == 0);
   CHECK(strstr(ran.out, "replay: identical") != NULL);
   picture p = picture_read(path);
