@@ -127,6 +127,8 @@ def refused_check():
              ("--serve a --lockstep", 2, "--lockstep"),
              ("--serve a --device virtual", 2, "--connect"),
              ("--connect a --model single", 2, "model contact"),
+             ("--connect a --view", 2, "no pictures yet"),
+             ("--serve a --html a.html", 2, "no pictures yet"),
              ("--insecure", 2, "only with --serve or --connect"),
              ("--serve a*b", 2, "name of the world"),
              ("--serve a --peers 10.0.0.1", 2, "certificates"),

@@ -747,11 +747,15 @@ static hap_status check_far(run_options *o, hap_detail *detail)
                         "--record, --play, --identify, --calibrate or --check-device",
                         name);
   }
-  if (f->serve != NULL &&
-      (o->rig.device_count > 0 || o->trace_path != NULL || o->plot_path != NULL ||
-       o->black_box_path != NULL || o->html_path != NULL || o->shot.path != NULL ||
-       o->shot.frames != NULL || o->window.wanted)) {
-    return options_fail(detail, "--serve: hands, traces and pictures are those of --connect");
+  if (f->serve != NULL && (o->rig.device_count > 0 || o->trace_path != NULL ||
+                           o->plot_path != NULL || o->black_box_path != NULL)) {
+    return options_fail(detail, "--serve: hands and traces are those of --connect");
+  }
+  if (o->html_path != NULL || o->shot.path != NULL || o->shot.frames != NULL || o->window.wanted) {
+    return options_fail(detail,
+                        "%s: no pictures yet, so not with --view, --html, --shot or --frames; "
+                        "poses of bodies are not told to the hand's session",
+                        name);
   }
   if (f->serve != NULL && o->rig.expert.look_ahead == 0.0) {
     o->rig.expert.look_ahead = LOOK_AHEAD_S;
