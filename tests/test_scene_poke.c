@@ -131,7 +131,8 @@ static void poke_look(poked *p, bool first)
   p->before_ns = now_ns;
 }
 
-/* Through the body to its other side, from where the hand is, and to the floor. */
+/* Through the body to its other side, from where the hand is, and to the floor; after it, where
+ * it falls. */
 static void poke_aim(const poked *p, int visit)
 {
   const double *at = p->before[(uint32_t)visit * 7u % p->bodies].position;
@@ -152,9 +153,7 @@ static void poke_for(const char *path, int seconds, hap_drive drive)
       hapi_clock_sleep_until(hapi_clock_now() + LOOK_MS * INT64_C(1000000));
     }
     poke_look(&p, ms == 0);
-    if (ms % VISIT_MS == 0) {
-      poke_aim(&p, ms / VISIT_MS);
-    }
+    poke_aim(&p, ms / VISIT_MS);
   }
   REQUIRE(hap_session_stats(p.session, &stats, sizeof stats) >= HAP_OK);
   printf(
