@@ -182,11 +182,11 @@ TEST(the_smaller_of_told_and_allowed_limits_counts)
 {
   server *s = server_open();
   client *c = client_open(s, "strong", 1000.0, 8);
-  s->far.world.bound.most = (hapi_limits){2.0, 1.0};
+  s->far.world.guests[0].bound.most = (hapi_limits){2.0, 1.0};
   c->far.loop.limits = (hapi_limits){1e9, 1e9};
   ends_run(s, c, 300);
-  CHECK(s->far.world.admitted);
-  CHECK(s->far.world.bound.limits.force == 2.0 && s->far.world.bound.limits.speed == 1.0);
+  CHECK(s->far.world.guests[0].admitted);
+  CHECK(s->far.world.guests[0].bound.limits.force == 2.0 && s->far.world.guests[0].bound.limits.speed == 1.0);
 }
 
 /* ---- honest ones: heavy bodies that fall, jump, are driven and edited near a hand ---- */
@@ -203,7 +203,7 @@ static bool bouncy_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters 
 
 static void honest_check(const server *s)
 {
-  CHECK(s->far.world.end.joined && s->far.world.admitted);
+  CHECK(s->far.world.end.joined && s->far.world.guests[0].admitted);
   CHECK(s->far.world.bounded == 0 && s->far.world.turned_away == 0);
   if (s->far.world.end.detail.text[0] != '\0') {
     printf("# %s\n", s->far.world.end.detail.text);

@@ -79,10 +79,6 @@ void hapi_physics_set_calls(hapi_physics *physics, const hapi_physics_calls *cal
 /* [control] Before begin: an exchange of the same capacity in place of that of the config. */
 void hapi_physics_set_exchange(hapi_physics *physics, hapi_exchange *exchange);
 
-/* [any] Another loop sends states from now on: its totals begin at zero, and it knows no body.
- * Before the next cycle takes one. */
-void hapi_physics_renew_loop(hapi_physics *physics);
-
 /* [control] LOCKSTEP: time from a cycle to the use of its model; negative: the model's own. */
 void hapi_physics_set_latency(hapi_physics *physics, double seconds);
 

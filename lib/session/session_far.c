@@ -125,11 +125,6 @@ static void network_stop(hap_session *session)
   hapi_thread_join(&session->ferry.far->thread);
 }
 
-static void far_renew(void *of)
-{
-  hapi_physics_renew_loop(of);
-}
-
 static hap_status far_fill(const hap_session *session, hapi_far *far)
 {
   const hap_session_def *def = &session->def;
@@ -142,8 +137,6 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
   far->world.terms.limits = (hapi_limits){HAP_CLIENT_FORCE, HAP_CLIENT_SPEED};
   far->loop.limits = session->ferry.limits;
   far->world.exchange = apart != NULL ? apart : session->exchange;
-  far->world.renew = far_renew;
-  far->world.renew_of = session->physics;
   far->loop.exchange = session->exchange;
   far->lockstep = def->drive == HAP_DRIVE_LOCKSTEP;
   pthread_mutex_init(&far->lock, NULL);
