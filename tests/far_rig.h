@@ -17,6 +17,8 @@
 
 /* ---- the world's session ---- */
 
+#define SERVER_ROOM 2 /* clients */
+
 typedef struct server {
   dWorldID world;
   dSpaceID space;
@@ -24,7 +26,8 @@ typedef struct server {
   hap_session *session;
   hap_link *link;
   hapi_far far;
-  raw_codec codec;
+  raw_codec raw[SERVER_ROOM];
+  hapi_codec codecs[SERVER_ROOM];
 } server;
 
 static inline bool cube_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
@@ -53,10 +56,12 @@ static inline void server_finish(void *owned)
   ode_world_end(s->session, s->world, s->space);
   hapi_far_finish(&s->far);
   hap_link_close(s->link);
-  raw_finish(&s->codec);
+  for (int i = 0; i < SERVER_ROOM; ++i) {
+    raw_finish(&s->raw[i]);
+  }
 }
 
-static inline server *server_open_with(hap_surface_fn surface)
+static inline server *server_open_for(hap_surface_fn surface, uint32_t room)
 {
   server *s = tap_own(sizeof *s, server_finish);
   hap_session_def def;
@@ -74,11 +79,21 @@ static inline server *server_open_with(hap_surface_fn surface)
   ode.surface = surface;
   s->session = session_make(&def, &ode);
   REQUIRE(hap_link_local_serve(&s->link, NULL) == HAP_OK);
-  REQUIRE(raw_init(&s->codec, s->session->exchange, true));
-  s->far.world.end = (hapi_end){.link = s->link, .codec = raw_codec_of(&s->codec)};
+  for (int i = 0; i < SERVER_ROOM; ++i) {
+    REQUIRE(raw_init(&s->raw[i], s->session->exchange, true));
+    s->codecs[i] = raw_codec_of(&s->raw[i]);
+  }
+  s->far.world.end = (hapi_end){.link = s->link};
+  s->far.world.codecs = s->codecs;
+  s->far.world.room = room;
   REQUIRE(hapi_session_set_far(s->session, HAPI_SIDE_WORLD, &s->far) == HAP_OK);
   session_run(s->session);
   return s;
+}
+
+static inline server *server_open_with(hap_surface_fn surface)
+{
+  return server_open_for(surface, 1);
 }
 
 static inline server *server_open(void)
