@@ -203,7 +203,8 @@ TEST(the_smaller_of_told_and_allowed_limits_counts)
   c->far.loop.limits = (hapi_limits){1e9, 1e9};
   ends_run(s, c, 300);
   CHECK(s->far.world.guests[0].admitted);
-  CHECK(s->far.world.guests[0].bound.limits.force == 2.0 && s->far.world.guests[0].bound.limits.speed == 1.0);
+  CHECK(s->far.world.guests[0].bound.limits.force == 2.0 &&
+        s->far.world.guests[0].bound.limits.speed == 1.0);
 }
 
 /* ---- beside an honest one ---- */
@@ -258,7 +259,7 @@ TEST(a_client_that_floods_is_turned_away_and_the_other_does_not_feel_it)
   server *s = server_open_for(cube_surface, 2);
   client *c = client_open(s, "honest", 1000.0, 8);
   client *other = client_open(s, "flood", 1000.0, 8);
-  const hap_link_address to = {.channel = 5};
+  const hap_link_address to = {.channel = HAPI_STAMPS_CHANNEL};
   hap_detail why = {""};
   double force[3];
   client_put(c, 0.0, 0.2, 0.0);
@@ -268,8 +269,8 @@ TEST(a_client_that_floods_is_turned_away_and_the_other_does_not_feel_it)
       client_put(c, 0.0, 0.057, 0.0);
     }
     for (int k = 0; i > 1500 && k < 100; ++k) {
-      hap_status sent = hap_link_send_newest(other->link, hap_session_now(other->session), &to,
-                                             "flood", 5);
+      hap_status sent =
+          hap_link_send_newest(other->link, hap_session_now(other->session), &to, "flood", 5);
       CHECK(sent >= HAP_OK);
     }
     ends_run(s, c, 1);

@@ -40,6 +40,8 @@ typedef enum hapi_pointer_phase {
 typedef struct hapi_pointer_target {
   hap_pose pose;
   hap_twist twist;
+  int64_t told_ns;    /* carried on from then: */
+  int64_t carried_ns; /* so long at most; then it stands. 0: the target is as it was told */
 } hapi_pointer_target;
 
 typedef struct hapi_pointer_slot {

@@ -95,11 +95,16 @@ static void body_note(hapi_guest *guest, uint32_t slot, const hapi_state_body *i
   }
 }
 
-bool hapi_guest_admit(hapi_guest *guest, int64_t now_ns, hapi_state *io, hap_detail *why)
+void hapi_guest_own(const hapi_guest *guest, hapi_state *io)
 {
   for (uint32_t i = 0; i < io->body_high; ++i) {
     body_admit(&guest->bodies[i], io->model_number, &hapi_state_bodies(io)[i]);
   }
+}
+
+bool hapi_guest_admit(hapi_guest *guest, int64_t now_ns, hapi_state *io, hap_detail *why)
+{
+  hapi_guest_own(guest, io);
   return hapi_bound_take(&guest->bound, now_ns, io, why);
 }
 

@@ -57,6 +57,8 @@ void hapi_guest_begin(hapi_guest *guest, int64_t now_ns, const hapi_capacity *ca
 /* A state that it tells. What it says of bodies that it was not given is left out. False: the rest
  * is beyond what it can do, and *why says how. */
 bool hapi_guest_admit(hapi_guest *guest, int64_t now_ns, hapi_state *io, hap_detail *why);
+/* The same of the world's own loop, which is believed. */
+void hapi_guest_own(const hapi_guest *guest, hapi_state *io);
 /* Takes it over. shares: by slot, and number: whose of them is this guest's. */
 void hapi_guest_take(hapi_guest *guest, int64_t now_ns, hapi_state *state, size_t size,
                      const hapi_share *shares, uint8_t number);

@@ -400,7 +400,8 @@ static void triangles_cut(const cutting *c)
 
 static void hand_rename(const cutting *c, uint32_t *io_number, uint32_t *io_generation)
 {
-  const hapi_share_hand *hand = &c->shares->hands[*io_number];
+  hapi_share_hand *hand = &c->shares->hands[*io_number];
+  hand->goes = hand->guest != c->guest;
   *io_generation = hand->guest == c->guest ? hand->own : hand->generation;
   *io_number = hapi_share_number(c->shares, c->guest, *io_number);
 }
@@ -526,6 +527,32 @@ static void tools_cut(const cutting *c)
   }
 }
 
+/* Those of others that something was cut of. */
+static void hands_cut(const cutting *c)
+{
+  c->to->hand_count = 0;
+  for (uint32_t i = 0; i < c->shares->hand_count; ++i) {
+    const hapi_share_hand *hand = &c->shares->hands[i];
+    const hapi_state_pointer *in = hand->state;
+    if (!hand->goes || in == NULL) {
+      continue;
+    }
+    hapi_model_hand *out = &hapi_model_hands(c->to)[c->to->hand_count++];
+    *out = (hapi_model_hand){.number = i,
+                             .generation = hand->generation,
+                             .radius = in->radius,
+                             .stiffness = in->stiffness,
+                             .damping = in->damping,
+                             .friction = in->friction,
+                             .finger_radius = in->finger_radius,
+                             .pose = in->pose,
+                             .twist = in->twist};
+    if (in->is_tool != 0) {
+      out->hull = *hand->hull;
+    }
+  }
+}
+
 static void near_cut(const cutting *c)
 {
   pairs_cut(c);
@@ -553,8 +580,12 @@ void hapi_shares_cut(const hapi_shares *shares, uint8_t guest, hapi_model *model
                      hapi_model *out_model, hapi_near *out_near)
 {
   const cutting c = {shares, guest, model, near, out_model, out_near};
+  for (uint32_t i = 0; i < shares->hand_count; ++i) {
+    shares->hands[i].goes = false;
+  }
   heads_copy(&c);
   bodies_want(&c);
   near_cut(&c);
   model_cut(&c);
+  hands_cut(&c);
 }

@@ -33,11 +33,13 @@ typedef struct hapi_share {
 
 /* A hand in the world, by its number there. */
 typedef struct hapi_share_hand {
-  uint8_t guest;       /* HAPI_GUEST_NONE: there is none */
-  uint32_t pointer;    /* its guest's number of it */
-  uint32_t generation; /* in the world */
-  uint32_t own;        /* its guest's generation */
-  hapi_state_pointer *state;
+  uint8_t guest;                   /* HAPI_GUEST_NONE: there is none */
+  uint32_t pointer;                /* its guest's number of it */
+  uint32_t generation;             /* in the world */
+  uint32_t own;                    /* its guest's generation */
+  const hapi_state_pointer *state; /* what its guest told last; NULL: nothing */
+  const hapi_tool_hull *hull;
+  bool goes; /* scratch: the guest has to know it */
 } hapi_share_hand;
 
 typedef struct hapi_shares {

@@ -24,20 +24,24 @@ hap_status hapi_world_end_begin(hapi_world_end *world)
   double late_s = world->terms.look_ahead_s + 2.0 * world->terms.period_s;
   world->terms.capacity = *capacity;
   world->room = world->codecs != NULL ? world->room : 1;
-  world->guests = hapi_alloc_array(world->room, sizeof *world->guests);
+  world->count = world->room + (world->loop != NULL ? 1 : 0);
+  world->guests = hapi_alloc_array(world->count, sizeof *world->guests);
   world->contact_guests = hapi_alloc_array(capacity->contacts, sizeof *world->contact_guests);
   bool shares = hapi_shares_create(&world->shares, capacity);
   bool merge = hapi_merge_create(&world->merge, capacity);
-  if (world->guests == NULL || world->contact_guests == NULL || !shares || !merge ||
+  bool hands = hapi_hands_create(&world->hands, capacity);
+  world->shares.loop = world->loop != NULL ? (uint8_t)world->room : HAPI_GUEST_NONE;
+  if (world->guests == NULL || world->contact_guests == NULL || !shares || !merge || !hands ||
       hapi_exchange_create(capacity, &world->cut) < HAP_OK) {
     return HAP_ERROR_MEMORY;
   }
   hap_status status = HAP_OK;
-  for (uint32_t i = 0; i < world->room && status >= HAP_OK; ++i) {
+  for (uint32_t i = 0; i < world->count && status >= HAP_OK; ++i) {
     hapi_guest *guest = &world->guests[i];
     status = hapi_guest_create(guest, world->exchange, late_s);
     guest->end.link = world->end.link;
-    guest->end.codec = world->codecs != NULL ? world->codecs[i] : world->end.codec;
+    guest->end.codec =
+        world->codecs != NULL && i < world->room ? world->codecs[i] : world->end.codec;
   }
   hapi_world_end_limit(world, &world->terms.limits);
   return status;
@@ -45,13 +49,14 @@ hap_status hapi_world_end_begin(hapi_world_end *world)
 
 void hapi_world_end_finish(hapi_world_end *world)
 {
-  for (uint32_t i = 0; world->guests != NULL && i < world->room; ++i) {
+  for (uint32_t i = 0; world->guests != NULL && i < world->count; ++i) {
     hapi_guest_finish(&world->guests[i]);
   }
   hapi_free(world->guests);
   hapi_free(world->contact_guests);
   hapi_shares_finish(&world->shares);
   hapi_merge_finish(&world->merge);
+  hapi_hands_finish(&world->hands);
   hapi_exchange_destroy(world->cut);
   world->guests = NULL;
   world->contact_guests = NULL;
@@ -78,6 +83,7 @@ static void hand_drop(hapi_world_end *world, hapi_guest_hand *io)
   if (io->generation != 0) {
     world->shares.hands[io->number].guest = HAPI_GUEST_NONE;
     world->shares.hands[io->number].state = NULL;
+    world->shares.hands[io->number].hull = NULL;
     io->generation = 0;
   }
 }
@@ -123,6 +129,7 @@ static bool hands_follow(hapi_world_end *world, hapi_guest *guest)
     }
     if (hand->generation != 0) {
       world->shares.hands[hand->number].state = in;
+      world->shares.hands[hand->number].hull = &hapi_state_hulls(guest->state)[i];
     }
   }
   return all;
@@ -342,17 +349,30 @@ static void guests_take(hapi_world_end *world)
   }
 }
 
+/* The world's own loop has no hands: those in it are the clients'. */
+static void loop_take(hapi_world_end *world)
+{
+  hapi_state *state = world->loop != NULL ? hapi_exchange_state_take(world->loop) : NULL;
+  if (state == NULL) {
+    return;
+  }
+  hapi_guest *guest = &world->guests[world->shares.loop];
+  size_t size = hapi_exchange_message_size(world->exchange, HAPI_CHANNEL_STATE);
+  hapi_guest_own(guest, state);
+  hapi_guest_take(guest, world->end.now_ns, state, size, world->shares.of, world->shares.loop);
+}
+
 static void guests_merge(hapi_world_end *world)
 {
   const hapi_merge_from from = {.shares = &world->shares,
                                 .guests = world->guests,
-                                .count = world->room,
+                                .count = world->count,
                                 .model_number = world->model_number,
                                 .now_ns = world->end.now_ns,
                                 .late_ns = PATIENCE_NS + llround(1e9 * world->terms.look_ahead_s),
                                 .contact_guests = world->contact_guests};
   bool fresh = false;
-  for (uint32_t i = 0; i < world->room; ++i) {
+  for (uint32_t i = 0; i < world->count; ++i) {
     fresh = fresh || world->guests[i].fresh;
   }
   if (fresh && hapi_merge_make(&world->merge, &from, hapi_exchange_state_back(world->exchange),
@@ -364,7 +384,7 @@ static void guests_merge(hapi_world_end *world)
 /* Of those that have gone what they gave stays. */
 static void guests_close(hapi_world_end *world)
 {
-  for (uint32_t i = 0; i < world->room; ++i) {
+  for (uint32_t i = 0; i < world->count; ++i) {
     hapi_guest *guest = &world->guests[i];
     guest->fresh = false;
     if (guest->leaves) {
@@ -397,6 +417,7 @@ void hapi_world_end_receive(hapi_world_end *world, int64_t now_ns)
   }
   world_poll(world);
   guests_take(world);
+  loop_take(world);
   guests_merge(world);
   guests_close(world);
   failures_take(world);
@@ -446,16 +467,51 @@ static void bodies_tell(const hapi_guest *guest, hapi_model *io)
   }
 }
 
+/* A copy that touches something does not fall freely from where it was told. */
+static void copies_tell(const hapi_world_end *world, hapi_model *io)
+{
+  const hapi_guest *loop = world->loop != NULL ? &world->guests[world->shares.loop] : NULL;
+  for (uint32_t i = 0; i < io->body_count && loop != NULL && loop->has_state; ++i) {
+    hapi_model_body *body = &hapi_model_bodies(io)[i];
+    bool told = (body->flags & HAPI_BODY_SHARED) != 0 && body->slot < loop->state->body_high;
+    if (told && (hapi_state_bodies(loop->state)[body->slot].flags & HAPI_BODY_TOUCHED) != 0) {
+      memset(body->b, 0, sizeof body->b);
+    }
+  }
+}
+
+/* The guest's part of the model, in world->cut. */
+static void part_make(hapi_world_end *world, hapi_guest *guest, hapi_model *model, hapi_near *near)
+{
+  hapi_model *part = hapi_exchange_model_back(world->cut);
+  hapi_shares_cut(&world->shares, guest_number(world, guest), model, near, part,
+                  hapi_exchange_near_back(world->cut));
+  bodies_give(world, guest, part);
+  bodies_tell(guest, part);
+}
+
 static void guest_send(hapi_world_end *world, hapi_guest *guest, hapi_model *model, hapi_near *near)
 {
   hapi_model *part = hapi_exchange_model_back(world->cut);
-  hapi_near *near_part = hapi_exchange_near_back(world->cut);
-  void *const messages[2] = {part, near_part};
-  hapi_shares_cut(&world->shares, guest_number(world, guest), model, near, part, near_part);
-  bodies_give(world, guest, part);
-  bodies_tell(guest, part);
+  void *const messages[2] = {part, hapi_exchange_near_back(world->cut)};
+  part_make(world, guest, model, near);
+  copies_tell(world, part);
   hapi_bound_note(&guest->bound, part);
   hapi_end_send(&guest->end, messages);
+}
+
+static void loop_send(hapi_world_end *world, hapi_model *model, hapi_near *near)
+{
+  hapi_model *part = hapi_exchange_model_back(world->loop);
+  hapi_near *near_part = hapi_exchange_near_back(world->loop);
+  part_make(world, &world->guests[world->shares.loop], model, near);
+  memcpy(part, hapi_exchange_model_back(world->cut),
+         hapi_exchange_message_size(world->loop, HAPI_CHANNEL_MODEL));
+  memcpy(near_part, hapi_exchange_near_back(world->cut),
+         hapi_exchange_message_size(world->loop, HAPI_CHANNEL_NEAR));
+  hapi_hands_follow(&world->hands, world->end.now_ns, part, near_part);
+  hapi_exchange_near_publish(world->loop);
+  hapi_exchange_model_publish(world->loop);
 }
 
 void hapi_world_end_send(hapi_world_end *world, int64_t now_ns)
@@ -465,6 +521,7 @@ void hapi_world_end_send(hapi_world_end *world, int64_t now_ns)
   if (model == NULL || near == NULL) {
     return;
   }
+  world->end.now_ns = now_ns;
   world->model_number = model->number;
   hapi_shares_find(&world->shares, model, near);
   contacts_note(world, model);
@@ -474,6 +531,9 @@ void hapi_world_end_send(hapi_world_end *world, int64_t now_ns)
     if (guest->end.joined) {
       guest_send(world, guest, model, near);
     }
+  }
+  if (world->loop != NULL) {
+    loop_send(world, model, near);
   }
   failures_take(world);
 }

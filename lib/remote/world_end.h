@@ -6,6 +6,7 @@
 /* The world's end of a session whose loops are elsewhere: physics' exchange on one side, the
  * server's link on the other. Physics hears of one loop only, merged of all. */
 
+#include "remote/hands.h"
 #include "remote/merge.h"
 
 typedef struct hapi_world_end {
@@ -13,8 +14,11 @@ typedef struct hapi_world_end {
   hapi_codec *codecs;      /* one for each client, room of them; NULL: end.codec */
   uint32_t room;           /* clients that there may be; begin sets it where there are no codecs */
   hapi_exchange *exchange; /* of physics */
+  hapi_exchange *loop;     /* of the world's own loop, a guest behind the clients; NULL: none */
+  hapi_hands hands;        /* in that; its calls are set before begin */
   hapi_terms terms;        /* for whoever joins */
-  hapi_guest *guests;      /* room of them */
+  hapi_guest *guests;      /* count of them */
+  uint32_t count;          /* room, and the world's own loop */
   hapi_shares shares;
   hapi_merge merge;
   hapi_exchange *cut;      /* what a guest is sent */
