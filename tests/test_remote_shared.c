@@ -7,6 +7,8 @@
 
 #include "tests/tap.h"
 
+#include "haptic/haptic_internal.h"
+#include "session/session_internal.h"
 #include "tests/hands_rig.h"
 
 #define EDGE 0.1        /* m */
@@ -61,8 +63,8 @@ static double hand_wish(task what, int which, double s)
              (s > 0.5 && s < 2.0 ? 0.015 * (1.0 - cos(2.0 * M_PI * (s - 0.5) / 1.5)) : 0.0);
     case TAP: { /* in turn, 2 Hz */
       double phase = 2.0 * M_PI * 2.0 * s + (which == 0 ? 0.0 : M_PI);
-      double in = s > 0.0 && s < 2.0 ? fmax(-cos(phase), 0.0) : 0.0;
-      return at - side * (out + 0.002) * in;
+      double in = s > 0.0 && s < 2.0 ? fmax(sin(phase), 0.0) : 0.0;
+      return at - side * (out + 0.002) * in * in;
     }
   }
   return at;
@@ -75,6 +77,9 @@ typedef struct pair_run {
   double v[2];
   double felt[2][JOIN_TICKS + TICKS + AFTER_TICKS];
   double place[JOIN_TICKS + TICKS + AFTER_TICKS];
+  double apart; /* m, of the copies and the world's cube, the most */
+  double left;  /* m, half a second after the last touch */
+  int touched;  /* tick of that */
 } pair_run;
 
 static void run_finish(void *owned)
@@ -137,6 +142,40 @@ static void run_tick(pair_run *run, task what, const grip *g, int tick)
   run->place[tick] = dBodyGetPosition(run->cube)[0];
 }
 
+/* m, of the cube in the hand's session; NaN: it is not there. */
+static void copy_place(const pair_run *run, int which, double out[3])
+{
+  const hapi_bodies *bodies = &run->rig->hands[which].session->haptic->tick.bodies;
+  out[0] = (double)NAN;
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    const hapi_local_body *body = &bodies->of[bodies->live[i]];
+    if ((body->flags & HAPI_BODY_OWNED) != 0) {
+      hapi_v3_copy(body->pose.position, out);
+    }
+  }
+}
+
+static void run_compare(pair_run *run, int tick)
+{
+  const dReal *world = dBodyGetPosition(run->cube);
+  double most = 0.0;
+  double at[2][3];
+  for (int i = 0; i < 2; ++i) {
+    copy_place(run, i, at[i]);
+    double way[3];
+    hapi_v3_sub(at[i], world, way);
+    most = fmax(most, hapi_v3_norm(way));
+    run->touched = run->felt[i][tick] != 0.0 ? tick : run->touched;
+  }
+  double way[3];
+  hapi_v3_sub(at[0], at[1], way);
+  most = fmax(most, hapi_v3_norm(way));
+  run->apart = tick >= JOIN_TICKS ? fmax(run->apart, most) : 0.0;
+  if (tick == run->touched + 500) {
+    run->left = most;
+  }
+}
+
 static double peak_of(const double *felt)
 {
   double peak = 0.0;
@@ -176,6 +215,7 @@ TEST_EACH(tasks, const shared_case *row)
       pair_run *run = run_new(delays[d]);
       for (int i = 0; i < JOIN_TICKS + TICKS + AFTER_TICKS; ++i) {
         run_tick(run, row->what, &grips[g], i);
+        run_compare(run, i);
       }
       double errors[2];
       double ratios[2];
@@ -184,11 +224,11 @@ TEST_EACH(tasks, const shared_case *row)
         ratios[i] = peak_of(run->felt[i]) / peak_of(reference->felt[i]);
       }
       hap_remote_state state = rig_state(run->rig->session);
-      printf(
-          "# %s, %s, %3.0f ms: errors %.2f %.2f, peaks %.2f %.2f of %.1f %.1f N; cube %.4f %.4f\n",
-          row->name, grips[g].name, 1e3 * delays[d], errors[0], errors[1], ratios[0], ratios[1],
-          peak_of(reference->felt[0]), peak_of(reference->felt[1]), run->place[4000],
-          reference->place[4000]);
+      printf("# %s, %s, %3.0f ms: errors %.2f %.2f, peaks %.2f %.2f of %.1f %.1f N; cube %.1f mm, "
+             "%.1f; apart %.1f mm, left %.2f mm\n",
+             row->name, grips[g].name, 1e3 * delays[d], errors[0], errors[1], ratios[0], ratios[1],
+             peak_of(reference->felt[0]), peak_of(reference->felt[1]), 1e3 * run->place[4000],
+             1e3 * reference->place[4000], 1e3 * run->apart, 1e3 * run->left);
       CHECK(state.bounded == 0 && state.refused == 0 && state.failed == 0);
       CHECK(fmax(ratios[0], ratios[1]) <= 3.5);
       CHECK(delays[d] > 0.01 || fmax(errors[0], errors[1]) <= 0.4);
