@@ -8,6 +8,7 @@
 #include "tests/tap.h"
 
 #include "haptic/haptic_internal.h"
+#include "physics/physics_internal.h"
 #include "session/session_internal.h"
 #include "tests/hands_rig.h"
 
@@ -224,11 +225,12 @@ TEST_EACH(tasks, const shared_case *row)
         ratios[i] = peak_of(run->felt[i]) / peak_of(reference->felt[i]);
       }
       hap_remote_state state = rig_state(run->rig->session);
-      printf("# %s, %s, %3.0f ms: errors %.2f %.2f, peaks %.2f %.2f of %.1f %.1f N; cube %.1f mm, "
-             "%.1f; apart %.1f mm, left %.2f mm\n",
-             row->name, grips[g].name, 1e3 * delays[d], errors[0], errors[1], ratios[0], ratios[1],
-             peak_of(reference->felt[0]), peak_of(reference->felt[1]), 1e3 * run->place[4000],
-             1e3 * reference->place[4000], 1e3 * run->apart, 1e3 * run->left);
+      printf(
+          "# %s, %s, %3.0f ms: errors %.2f %.2f, peaks %.2f %.2f of %.1f %.1f N; cube %.1f mm, "
+          "%.1f; apart %.1f mm, left %.2f mm\n",
+          row->name, grips[g].name, 1e3 * delays[d], errors[0], errors[1], ratios[0], ratios[1],
+          peak_of(reference->felt[0]), peak_of(reference->felt[1]), 1e3 * run->place[4000],
+          1e3 * reference->place[4000], 1e3 * run->apart, 1e3 * run->left);
       CHECK(state.bounded == 0 && state.refused == 0 && state.failed == 0);
       CHECK(fmax(ratios[0], ratios[1]) <= 3.5);
       CHECK(delays[d] > 0.01 || fmax(errors[0], errors[1]) <= 0.4);
@@ -237,5 +239,97 @@ TEST_EACH(tasks, const shared_case *row)
     }
     tap_release(reference->rig);
     tap_release(reference);
+  }
+}
+
+/* ---- hands that come near and go ---- */
+
+/* Hand 0 presses on the top from above, 3 mm in, and takes the cube along; the other one comes near
+ * and goes again. */
+TEST(a_hand_that_comes_near_and_goes_is_not_felt)
+{
+  static const double delays[] = {0.0, 0.05, 0.1};
+  for (int d = 0; d < 3; ++d) {
+    pair_run *run = run_new(delays[d]);
+    hands_rig *r = run->rig;
+    double before[3] = {0.0};
+    double step = 0.0;
+    double least = HUGE_VAL;
+    for (int i = 0; i < 9000; ++i) {
+      double s = 1e-3 * i;
+      double z = EDGE + RADIUS + fmax(0.05 - 0.1 * fmax(s - 1.0, 0.0), -0.003);
+      double far = s < 4.0   ? 5.0
+                   : s < 6.0 ? fmax(5.0 - 3.0 * (s - 4.0), 0.4)
+                             : fmin(0.4 + 3.0 * (s - 6.0), 5.0);
+      double v = s > 4.0 && far > 0.4 && far < 5.0 ? (s < 6.0 ? -3.0 : 3.0) : 0.0;
+      rig_put(r, 0, AT(0.0, 0.0, z), AT(0.0, 0.0, 0.0));
+      rig_put(r, 1, AT(far, 0.0, 0.5), AT(v, 0.0, 0.0));
+      rig_tick(r);
+      double force[3];
+      rig_feel(r, 0, force);
+      for (int k = 0; k < 3 && i > 3000; ++k) {
+        step = fmax(step, fabs(force[k] - before[k]));
+      }
+      least = i > 3000 ? fmin(least, force[2]) : least;
+      memcpy(before, force, sizeof before);
+    }
+    printf("# %3.0f ms: steps of %.3f N at most, %.3f N at least\n", 1e3 * delays[d], step, least);
+    CHECK(step < 0.005);
+    CHECK_NEAR(least, 6.0, 0.1); /* the world's cube rests elsewhere in the layer of 0.1 mm */
+    tap_release(run->rig);
+    tap_release(run);
+  }
+}
+
+/* ---- momentum ---- */
+
+/* A cube in free space: both hands push it about, one comes later, one is gone at once. What hands
+ * gave is what the cube has. */
+TEST(the_momentum_of_a_shared_cube_is_what_hands_gave_to_it)
+{
+  static const double delays[] = {0.0, 0.01, 0.1};
+  for (int d = 0; d < 3; ++d) {
+    pair_run *run = tap_own(sizeof *run, run_finish);
+    hap_pointer_def hand;
+    hands_rig *r = run->rig = rig_new(delays[d], 4);
+    dWorldSetGravity(r->world, 0.0, 0.0, 0.0);
+    run->cube = ode_box(r->world, r->space, MASS, AT(EDGE, EDGE, EDGE), AT(0.0, 0.0, 0.0));
+    rig_serve(r, cube_surface);
+    hap_pointer_def_init(&hand, sizeof hand);
+    hand.radius = RADIUS;
+    hand.stiffness = STIFFNESS;
+    session_run(r->session);
+    rig_join(r, 0, &hand);
+    rig_join(r, 1, &hand);
+    double given = 0.0;
+    double worst = 0.0;
+    const double *counted = r->session->physics->account.counts.hand_impulse;
+    for (int i = 0; i < 6000; ++i) {
+      double s = 1e-3 * i;
+      for (int k = 0; k < 2 && r->hands[k].session != NULL; ++k) { /* each follows the cube */
+        double side = k == 0 ? -1.0 : 1.0;
+        double far = k == 1 && s < 2.0 ? 4.0 : 0.0;
+        double in = 0.004 * fmax(sin(2.0 * M_PI * (k == 0 ? 1.0 : 1.3) * s), 0.0) - 0.002;
+        in = s < 1.0 || s > 5.0 ? -0.05 : in;
+        double x = dBodyGetPosition(run->cube)[0] + side * (0.5 * EDGE + RADIUS - in + far);
+        rig_put(r, k, AT(x, 0.0, 0.0), AT(0.0, 0.0, 0.0));
+      }
+      if (i == 4000) {
+        rig_leave(r, 1);
+      }
+      rig_tick(r);
+      given = fmax(given, fabs(counted[0]));
+      /* Of the newest state that physics has had. */
+      double p = MASS * dBodyGetLinearVel(run->cube)[0];
+      worst = fmax(worst, fabs(p - counted[0]));
+    }
+    double p = MASS * dBodyGetLinearVel(run->cube)[0];
+    printf("# %3.0f ms: %.4f N s given at most, %.2g N s not there in between, %.2g at the end\n",
+           1e3 * delays[d], given, worst, fabs(p - counted[0]));
+    CHECK(given > 0.05);
+    CHECK(worst <= 1e-5); /* a velocity on its way is rounded to 4e-6 m/s */
+    CHECK(fabs(p - counted[0]) <= 1e-5);
+    tap_release(run->rig);
+    tap_release(run);
   }
 }

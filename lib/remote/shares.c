@@ -239,6 +239,7 @@ void hapi_shares_find(hapi_shares *shares, hapi_model *model, hapi_near *near)
     }
     const hapi_share *root = &shares->of[island_root(shares, slot)];
     share->before = share->of != root->chosen ? share->of : HAPI_GUEST_NONE;
+    share->since = share->of != root->chosen ? model->number : share->since;
     share->of = root->chosen;
     share->hands = root->hands;
     shares->shared += share->of == shares->loop && share->of != HAPI_GUEST_NONE;

@@ -21,6 +21,7 @@
 /* Of the body of a slot. */
 typedef struct hapi_share {
   uint32_t generation; /* 0: no model had the slot */
+  uint64_t since;      /* the model with which that loop came to move it */
   uint32_t link;       /* scratch: another body of the island, or itself */
   uint32_t hands;      /* of the island, in the newest model: set of guests */
   uint8_t of;          /* whose loop moves it */

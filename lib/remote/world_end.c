@@ -467,14 +467,22 @@ static void bodies_tell(const hapi_guest *guest, hapi_model *io)
   }
 }
 
-/* A copy that touches something does not fall freely from where it was told. */
+#define FLIGHT_MODELS 4u
+
+/* Only a body that is known to fly falls on from where it was told: what has come to the world's
+ * loop just now has no contacts there yet. */
 static void copies_tell(const hapi_world_end *world, hapi_model *io)
 {
-  const hapi_guest *loop = world->loop != NULL ? &world->guests[world->shares.loop] : NULL;
-  for (uint32_t i = 0; i < io->body_count && loop != NULL && loop->has_state; ++i) {
+  hapi_state *state = world->loop != NULL ? world->guests[world->shares.loop].state : NULL;
+  for (uint32_t i = 0; i < io->body_count && state != NULL; ++i) {
     hapi_model_body *body = &hapi_model_bodies(io)[i];
-    bool told = (body->flags & HAPI_BODY_SHARED) != 0 && body->slot < loop->state->body_high;
-    if (told && (hapi_state_bodies(loop->state)[body->slot].flags & HAPI_BODY_TOUCHED) != 0) {
+    if ((body->flags & HAPI_BODY_SHARED) == 0) {
+      continue;
+    }
+    uint32_t flags = body->slot < state->body_high ? hapi_state_bodies(state)[body->slot].flags : 0;
+    bool flies = (flags & (HAPI_BODY_OWNED | HAPI_BODY_TOUCHED)) == HAPI_BODY_OWNED &&
+                 io->number >= world->shares.of[body->slot].since + FLIGHT_MODELS;
+    if (!flies) {
       memset(body->b, 0, sizeof body->b);
     }
   }
