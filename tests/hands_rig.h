@@ -4,7 +4,7 @@
 #define HAPODE_TESTS_HANDS_RIG_H
 
 /* A world and several hands, by the public API and on the virtual clock: each hand in a session of
- * its own at the other end of a link, or all of them in the world's session. Include after tap.h. */
+ * its own at the other end of a link, or all in the world's session. Include after tap.h. */
 
 #include "tests/ode_world.h"
 #include "tests/shifted_link.h"

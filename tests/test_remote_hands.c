@@ -125,7 +125,7 @@ TEST_EACH(cases, const hands_case *row)
   CHECK(world.joined == (uint32_t)row->count && world.joins == (uint64_t)row->count);
   CHECK(world.refused == 0 && world.failed == 0 && world.bounded == 0 && world.turned_away == 0);
   CHECK(stats.hand.momentum_error_ns < 1e-9);
-  for (int i = 0; i < row->count; i += row->count > 2 ? 5 : 1) {
+  for (int i = 0; i<row->count; i += row->count> 2 ? 5 : 1) {
     hap_remote_state of = rig_state(r->hands[i].session);
     double error = error_of(felt[i], alone_new(row->delay, i));
     printf("# hand %d: %.4f %% off, %.1f and %.1f kB/s\n", i, 100.0 * error,

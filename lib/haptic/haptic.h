@@ -77,8 +77,8 @@ hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, h
 void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out);
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                   const hap_twist *twist);
-/* The same, and from told_ns on, in the loop's time, the target goes on as fast, for carried_ns; then
- * it stands. */
+/* The same; from the first time on, of the loop, the target goes on as fast, for the second one;
+ * then it stands. */
 hap_status hapi_haptic_carry_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                     const hap_twist *twist, const int64_t told_carried_ns[2]);
 /* [any] Changes what was set last by merge, which says what is wrong, and hands it to the loop.

@@ -8,17 +8,15 @@
 #include "base/pose.h"
 #include "local/body_stay.h"
 
-/* The rotation that takes one orientation to the other, as a vector. */
+/* The rotation that takes one orientation to the other, as a vector: of small angles, and of large
+ * ones the way. */
 static void turn_between(const double from[4], const double to[4], double out[3])
 {
-  double turn[3];
   double cosine = from[0] * to[0] + hapi_v3_dot(from + 1, to + 1);
-  hapi_v3_cross(from + 1, to + 1, turn);
-  hapi_v3_madd(turn, from[0], to + 1, turn);
-  hapi_v3_madd(turn, -to[0], from + 1, turn);
-  double sine = hapi_v3_norm(turn);
-  double angle = 2.0 * atan2(sine, fabs(cosine));
-  hapi_v3_scale(sine > 0.0 ? (cosine < 0.0 ? -angle : angle) / sine : 0.0, turn, out);
+  hapi_v3_cross(from + 1, to + 1, out);
+  hapi_v3_madd(out, from[0], to + 1, out);
+  hapi_v3_madd(out, -to[0], from + 1, out);
+  hapi_v3_scale(cosine < 0.0 ? -2.0 : 2.0, out, out); /* q and -q are the same */
 }
 
 void hapi_body_draw_adopt(hapi_local_body *body, const hapi_model_body *in, double age_s,

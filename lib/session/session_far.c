@@ -4,9 +4,6 @@
 
 #include "base/clock.h"
 #include "base/log.h"
-#include "base/pointer_setup.h"
-#include "base/safety.h"
-#include "base/vec.h"
 #include "session/session_internal.h"
 
 /* Physics and loop without memory in common: what one knows of the other comes in messages. */
@@ -188,26 +185,6 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
       (hapi_hands_calls){session->haptic, hand_add, hand_acts, hand_remove, hand_put};
   HAPI_TRY(hapi_world_end_begin(&far->world));
   return hapi_loop_end_begin(&far->loop);
-}
-
-/* ---- what a hand can do ---- */
-
-#define REACH_M 0.1 /* a hand presses a pointer no farther into what does not give way */
-
-/* A body gets what the pointer's spring gives, also where the device gives less to the hand. */
-void hapi_session_allow(hap_session *session, const hapi_pointer_setup *setup)
-{
-  double felt = setup->force_scale > 0.0 ? setup->max_force / setup->force_scale : 0.0;
-  hapi_far *far = session->ferry.far;
-  session->ferry.limits.force += hapi_max(felt, REACH_M * setup->stiffness);
-  session->ferry.limits.speed =
-      hapi_max(session->ferry.limits.speed, HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale);
-  if (far != NULL) {
-    pthread_mutex_lock(&far->lock);
-    far->loop.limits = session->ferry.limits;
-    far->loop.limits_told = false;
-    pthread_mutex_unlock(&far->lock);
-  }
 }
 
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far)

@@ -141,8 +141,6 @@ typedef struct hapi_far {
  * Errors as above, and HAP_ERROR_MEMORY. */
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
 void hapi_far_finish(hapi_far *far); /* begun before */
-/* Another pointer can do so much more. */
-void hapi_session_allow(hap_session *session, const hapi_pointer_setup *setup);
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */

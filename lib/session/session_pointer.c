@@ -102,6 +102,42 @@ hap_status hapi_session_check_coupling(const hap_session *session, const hapi_po
                          hap_coupling_name(setup->coupling), hap_model_name(session->def.model));
 }
 
+/* ---- what a hand can do ---- */
+
+#define REACH_M 0.1 /* a hand presses a pointer no farther into what does not give way */
+
+/* A body gets what the pointer's spring gives, also where the device gives less to the hand. */
+static void hand_allow(hap_session *session, const hapi_pointer_setup *setup)
+{
+  double felt = setup->force_scale > 0.0 ? setup->max_force / setup->force_scale : 0.0;
+  hapi_far *far = session->ferry.far;
+  session->ferry.limits.force += hapi_max(felt, REACH_M * setup->stiffness);
+  session->ferry.limits.speed =
+      hapi_max(session->ferry.limits.speed, HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale);
+  if (far != NULL) {
+    far->loop.limits = session->ferry.limits;
+    far->loop.limits_told = false;
+  }
+}
+
+/* Hands of other sessions come as pointers, too, in another thread. */
+static hap_status hand_add(hap_session *session, const hapi_pointer_setup *setup,
+                           hap_pointer_id *out, hap_detail *detail)
+{
+  hapi_far *far = session->ferry.far;
+  if (far != NULL) {
+    pthread_mutex_lock(&far->lock);
+  }
+  hap_status status = hapi_haptic_add_pointer(session->haptic, setup, out, detail);
+  if (status >= HAP_OK) {
+    hand_allow(session, setup);
+  }
+  if (far != NULL) {
+    pthread_mutex_unlock(&far->lock);
+  }
+  return status;
+}
+
 hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap_pointer_id *out)
 {
   HAPI_TRY(hapi_session_may_change(session));
@@ -122,10 +158,7 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
   }
   if (status >= HAP_OK) {
     hapi_quat_normalize(setup.pose_world_device.quat_wxyz);
-    status = hapi_haptic_add_pointer(session->haptic, &setup, out, &detail);
-  }
-  if (status >= HAP_OK) {
-    hapi_session_allow(session, &setup);
+    status = hand_add(session, &setup, out, &detail);
   }
   return hapi_session_note(session, status, &detail);
 }
