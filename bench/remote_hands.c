@@ -90,6 +90,7 @@ static hap_status side_create(const hands_stage *stage, hands_side *side)
   session_defs_init(&def, &expert, &research);
   def.drive = HAP_DRIVE_LOCKSTEP;
   def.physics_hz = 60.0;
+  research.guard = HAP_GUARD_MEASURE; /* the force before it is the one to compare */
   def.max_bodies = 8;
   def.max_contacts = 64;
   expert.look_ahead = is_here(stage->run) ? 0.0 : 2.0 * stage->run->delay_s + 0.05;

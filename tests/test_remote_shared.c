@@ -8,6 +8,7 @@
 #include "tests/tap.h"
 
 #include "bench/remote_hands.h"
+#include "haptic/haptic_internal.h"
 #include "physics/physics_internal.h"
 #include "session/session_internal.h"
 #include "tests/hands_rig.h"
@@ -135,6 +136,35 @@ TEST(a_hand_that_comes_near_and_goes_is_not_felt)
     tap_release(run->rig);
     tap_release(run);
   }
+}
+
+/* An application hears of its own pointer alone. */
+TEST(touches_of_another_session_s_hand_are_not_told)
+{
+  pair_run *run = run_new(0.05);
+  hands_rig *r = run->rig;
+  int own = 0;
+  int others = 0;
+  int copies = 0;
+  for (int i = 0; i < 3000; ++i) {
+    double in = i < 1000 ? 0.02 : fmax(0.02 - 1e-4 * (i - 1000), -0.002);
+    for (int k = 0; k < 2; ++k) {
+      rig_put(r, k, AT((k == 0 ? -1.0 : 1.0) * (0.5 * EDGE + RADIUS + in), 0.0, 0.5 * EDGE),
+              AT(0.0, 0.0, 0.0));
+    }
+    rig_tick(r);
+    hap_event event;
+    size_t count = 0;
+    while (hap_session_events(r->hands[0].session, &event, 1, sizeof event, &count) == HAP_OK) {
+      own += event.pointer.v == r->hands[0].id.v;
+      others += event.pointer.v != r->hands[0].id.v;
+    }
+    const hapi_pointers *pointers = &r->hands[0].session->haptic->tick.pointers;
+    copies = i == 2900 ? (int)pointers->high : copies;
+  }
+  CHECK(copies == 2); /* the other one is there */
+  CHECK(rig_state(r->session).shared == 1);
+  CHECK(own > 0 && others == 0);
 }
 
 /* ---- momentum ---- */

@@ -228,6 +228,7 @@ typedef struct hapi_pointer {
   uint32_t contacts;   /* that push */
   bool proxied;        /* it is a proxy, of whatever coupling */
   bool rigid;          /* one whose contacts do not give: god-object and virtual tool */
+  bool foreign;        /* of another session: the application does not hear of it */
   bool own;            /* it has own forces: tick/own_forces.h */
   bool has_axes;       /* pointer/axes.h */
   bool drives;         /* outputs beside the wrench were set: tick/outputs.h */

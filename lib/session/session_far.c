@@ -144,7 +144,11 @@ static uint64_t hand_add(void *of, const hapi_model_hand *hand)
     return 0;
   }
   setup.coupling = HAP_COUPLING_DIRECT;
-  return hapi_haptic_add_pointer(of, &setup, &id, &why) < HAP_OK ? 0 : id.v;
+  if (hapi_haptic_add_pointer(of, &setup, &id, &why) < HAP_OK) {
+    return 0;
+  }
+  hapi_haptic_set_foreign(of, id);
+  return id.v;
 }
 
 static bool hand_acts(void *of, uint64_t id)

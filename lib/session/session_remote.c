@@ -136,6 +136,7 @@ static void world_tell(const hapi_world_end *world, hap_remote_state *out)
   out->look_ahead = world->terms.look_ahead_s;
   out->bounded = world->bounded;
   out->turned_away = world->turned_away;
+  out->shared = world->shares.shared;
 }
 
 static void loop_tell(const hapi_loop_end *loop, hap_remote_state *out)
@@ -144,6 +145,7 @@ static void loop_tell(const hapi_loop_end *loop, hap_remote_state *out)
   out->joins = loop->number > 0 || loop->agreed;
   out->look_ahead = loop->terms.look_ahead_s;
   out->turned_away = loop->turned_away;
+  out->left_out = loop->hands.left_out;
   if (loop->stamps.count > 0) {
     int64_t trip_ns;
     out->clock_ahead_s = 1e-9 * (double)hapi_stamps_offset(&loop->stamps, &trip_ns);
