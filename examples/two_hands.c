@@ -74,8 +74,8 @@ int main(void)
   hap_remote_state state;
   hap_pose pose;
   /* Both take hold of the box; then the left one pushes it over to the right one. */
-  const char *left = "virtual:path=0:-0.1/0/0.03;1:-0.1/0/0.03;2:-0.057/0/0.03;3:-0.037/0/0.03";
-  const char *right = "virtual:path=0:0.1/0/0.03;1:0.1/0/0.03;2:0.057/0/0.03,stiffness=300";
+  const char *left = "virtual:path=0:-0.06/0/0.03;1:-0.06/0/0.03;2:-0.007/0/0.03;3:0.02/0/0.03";
+  const char *right = "virtual:path=0:0.12/0/0.03;1:0.12/0/0.03;2:0.057/0/0.03,stiffness=300";
   if (session_make("slide", &scene, &world) ||
       call_fails(NULL, hap_link_local_serve(&server, &why)) ||
       call_fails(world, hap_session_serve(world, server)) ||
