@@ -37,22 +37,32 @@ typedef struct pair_run {
   dBodyID cube;
 } pair_run;
 
-static pair_run *run_new(double delay)
+static pair_run *run_with(double delay, const hap_pointer_def *def)
 {
   pair_run *run = tap_own(sizeof *run, run_finish);
-  hap_pointer_def hand;
   hands_rig *r = run->rig = rig_new(delay, 4);
   dCreatePlane(r->space, 0.0, 0.0, 1.0, 0.0);
   run->cube = ode_box(r->world, r->space, MASS, AT(EDGE, EDGE, EDGE), AT(0.0, 0.0, 0.5 * EDGE));
   rig_serve(r, cube_surface);
+  if (delay >= 0.0) {
+    session_run(r->session);
+  }
+  rig_join(r, 0, def);
+  rig_join(r, 1, def);
+  if (delay < 0.0) {
+    session_run(r->session);
+  }
+  return run;
+}
+
+static pair_run *run_new(double delay)
+{
+  hap_pointer_def hand;
   hap_pointer_def_init(&hand, sizeof hand);
   hand.radius = RADIUS;
   hand.stiffness = STIFFNESS;
   hand.friction = 0.5;
-  session_run(r->session);
-  rig_join(r, 0, &hand);
-  rig_join(r, 1, &hand);
-  return run;
+  return run_with(delay, &hand);
 }
 
 /* ---- two hands do something with it ---- */
@@ -165,6 +175,74 @@ TEST(touches_of_another_session_s_hand_are_not_told)
   CHECK(copies == 2); /* the other one is there */
   CHECK(rig_state(r->session).shared == 1);
   CHECK(own > 0 && others == 0);
+}
+
+/* A proxy stays at the surface, and so its pose alone would not push: hand 0 pushes the cube 20 mm
+ * along, against friction, beside the world and apart. */
+TEST(a_proxy_pushes_the_cube_of_all)
+{
+  static const double delays[] = {-1.0, 0.05};
+  double place[2];
+  double felt[2][3];
+  for (int d = 0; d < 2; ++d) {
+    hap_pointer_def hand;
+    hap_pointer_expert_def expert;
+    hap_pointer_research_def research;
+    pointer_defs_init(&hand, &expert, &research);
+    hand.radius = RADIUS;
+    hand.stiffness = STIFFNESS;
+    expert.coupling = HAP_COUPLING_PROXY;
+    expert.coupling_stiffness = 1000.0;
+    pair_run *run = run_with(delays[d], &hand);
+    hands_rig *r = run->rig;
+    for (int i = 0; i < 4000; ++i) {
+      double in = i < 1000 ? -0.02 : fmin(2e-5 * (i - 1000) - 0.02, 0.02);
+      rig_put(r, 0, AT(in - 0.5 * EDGE - RADIUS, 0.0, 0.5 * EDGE),
+              AT(i > 1000 && in < 0.02 ? 0.02 : 0.0, 0.0, 0.0));
+      rig_put(r, 1, AT(0.3, 0.0, 0.5 * EDGE), AT(0.0, 0.0, 0.0));
+      rig_tick(r);
+    }
+    rig_feel(r, 0, felt[d]);
+    place[d] = dBodyGetPosition(run->cube)[0];
+    tap_release(run->rig);
+    tap_release(run);
+  }
+  printf("# cube at %.2f mm, %.2f beside; %.3f N, %.3f beside\n", 1e3 * place[1], 1e3 * place[0],
+         felt[1][0], felt[0][0]);
+  CHECK(place[0] > 0.015);
+  CHECK_NEAR(place[1], place[0], 1e-3);
+  CHECK_NEAR(felt[1][0], felt[0][0], 0.6); /* friction holds any 2.9 N */
+}
+
+/* The other hand presses on the side and its session is gone at once, while the first one presses
+ * on the top. */
+TEST(a_session_that_dies_is_not_felt_by_the_other_one)
+{
+  pair_run *run = run_new(0.05);
+  hands_rig *r = run->rig;
+  double before[3] = {0.0};
+  double step = 0.0;
+  for (int i = 0; i < 5000; ++i) {
+    double down = i < 1000 ? 0.05 : fmax(0.05 - 1e-4 * (i - 1000), -0.003);
+    double in = i < 2000 ? 0.02 : fmax(0.02 - 1e-4 * (i - 2000), -0.001);
+    double force[3];
+    rig_put(r, 0, AT(0.0, 0.0, EDGE + RADIUS + down), AT(0.0, 0.0, 0.0));
+    if (i == 4000) {
+      rig_leave(r, 1);
+    } else if (i < 4000) {
+      rig_put(r, 1, AT(0.5 * EDGE + RADIUS + in, 0.0, 0.5 * EDGE), AT(0.0, 0.0, 0.0));
+    }
+    rig_tick(r);
+    rig_feel(r, 0, force);
+    for (int k = 0; k < 3 && i > 3900; ++k) {
+      step = fmax(step, fabs(force[k] - before[k]));
+    }
+    memcpy(before, force, sizeof before);
+  }
+  printf("# steps of %.4f N at most, %.3f N at the end\n", step, before[2]);
+  CHECK(step < 0.02);
+  CHECK_NEAR(before[2], 6.0, 0.1);
+  CHECK(rig_state(r->session).joined == 1);
 }
 
 /* ---- momentum ---- */

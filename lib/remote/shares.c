@@ -548,6 +548,8 @@ static void hands_cut(const cutting *c)
                              .finger_radius = in->finger_radius,
                              .pose = in->pose,
                              .twist = in->twist};
+    hapi_v3_add(in->pose.position, in->apart, out->pose.position);
+    out->stiffness = in->hold > 0.0 ? in->hold : in->stiffness;
     if (in->is_tool != 0) {
       out->hull = *hand->hull;
     }

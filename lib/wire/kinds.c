@@ -254,6 +254,8 @@ static const hapi_wire_field pointer_fields[] = {
     H(OPEN, magnet_hold, 1),
     H(POSE, pose),
     H(TWIST, twist),
+    H(FIXED, apart, 3, HAPI_WIRE_POSITION_BITS),
+    H(EXACT, hold, 1),
     H(NUMBER, is_tool),
     H(EXACT, extent, 1),
     H(NUMBER, bound_count),
