@@ -208,7 +208,9 @@ static void crowd_move(const crowd *c, double s)
   for (int i = 0; i < HANDS; ++i) {
     double wave = 0.5 + 0.5 * cos(M_PI * s + i);
     double speed = -0.5 * M_PI * sin(M_PI * s + i);
-    const hap_pose pose = {{0.0, APART * i, 0.057 + 0.02 * wave}, {1.0, 0.0, 0.0, 0.0}};
+    double y = i < HANDS - 1 ? APART * i : APART * (i - 1); /* the last two share a cube */
+    double x = i == HANDS - 2 ? -0.012 : i == HANDS - 1 ? 0.012 : 0.0;
+    const hap_pose pose = {{x, y, 0.057 + 0.02 * wave}, {1.0, 0.0, 0.0, 0.0}};
     const hap_twist twist = {{0.0, 0.0, 0.02 * speed}, {0.0, 0.0, 0.0}};
     CHECK(hap_pointer_set_target(c->sides[i].session, c->sides[i].hand, &pose, &twist) == HAP_OK);
   }
@@ -270,6 +272,7 @@ TEST(sixteen_hands_have_a_world_at_its_rate_or_are_told)
       1e-3 * (double)state.figures.sent_bytes / at,
       1e-3 * (double)state.figures.received_bytes / at, used / at);
   CHECK(state.joined == HANDS && state.joins == HANDS && state.turned_away == 0);
+  CHECK(state.shared == 1);
   CHECK(state.refused == 0 && state.failed == 0 && state.bounded == 0);
   CHECK(steps + missed >= 0.99 * PHYSICS_HZ * at - 2.0); /* the rate, or what was missed */
   int felt = 0;

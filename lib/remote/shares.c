@@ -78,7 +78,8 @@ static void bodies_begin(const hapi_shares *shares, hapi_model *model)
 {
   for (uint32_t i = 0; i < shares->body_count; ++i) {
     hapi_share *share = &shares->of[i];
-    share->there = share->held = share->wanted = false;
+    share->there = share->wanted = false;
+    share->holders = 0;
     share->link = i;
     share->hands = 0;
   }
@@ -113,7 +114,7 @@ static void hand_reach(const hapi_shares *shares, uint32_t hand, uint32_t slot, 
   if (share_at(shares, slot) != NULL && shares->hands[hand].guest != HAPI_GUEST_NONE) {
     hapi_share *root = &shares->of[island_root(shares, slot)];
     root->hands |= UINT32_C(1) << shares->hands[hand].guest;
-    root->held = root->held || holds;
+    root->holders |= holds ? UINT32_C(1) << shares->hands[hand].guest : 0;
   }
 }
 
@@ -192,7 +193,7 @@ static uint8_t island_choose(const hapi_shares *shares, const hapi_share *root,
   if (root->hands == 0) {
     return before != HAPI_GUEST_NONE && !shared ? before : guest_nearest(shares, position);
   }
-  if (shares->loop != HAPI_GUEST_NONE && !root->held && (!one || shared)) {
+  if (shares->loop != HAPI_GUEST_NONE && !set_has(root->holders, before) && (!one || shared)) {
     return shares->loop;
   }
   return set_has(root->hands, before) ? before : set_first(root->hands);

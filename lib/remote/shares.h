@@ -7,8 +7,8 @@
  * sync are an island. An island that hands of one guest reach is that guest's. One that hands of
  * several guests reach is moved by the world's own loop, with all these hands; each of the guests
  * has a copy. It stays so until no hand reaches it: a change of the loop is a change of the body's
- * place by what messages take. Where a hand holds a body of an island, or the world has no loop of
- * its own, one of the guests moves it, and it is a moved wall for the others. */
+ * place by what messages take. Where the guest that moves an island holds a body of it, or the world
+ * has no loop of its own, one guest moves it, and it is a moved wall for the others. */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -27,7 +27,7 @@ typedef struct hapi_share {
   uint8_t of;          /* whose loop moves it */
   uint8_t before;      /* the guest that moved it up to the newest model; HAPI_GUEST_NONE: none */
   uint8_t chosen;      /* scratch, of an island: who shall move it */
-  bool held;           /* by a hand of its island */
+  uint32_t holders;    /* of the island: set of guests whose hands hold a body of it */
   bool there;          /* in the newest model, and not driven */
   bool wanted;         /* scratch: goes to the guest */
 } hapi_share;
