@@ -168,7 +168,7 @@ static void side_close(const hands_side *side)
 
 /* ---- the hands ---- */
 
-static double smooth(double share)
+static double share_smooth(double share)
 {
   double s = hapi_clamp(share, 0.0, 1.0);
   return s * s * (3.0 - 2.0 * s);
@@ -177,7 +177,7 @@ static double smooth(double share)
 /* m, out of the cube's side, where the hand wants to be; s: since the begin. */
 static double hand_wish(remote_task task, int which, double s)
 {
-  double in = smooth(s / RISE_S) - smooth((s - END_S) / RISE_S);
+  double in = share_smooth(s / RISE_S) - share_smooth((s - END_S) / RISE_S);
   double pushed = s > 0.5 && s < END_S ? 0.015 * (1.0 - cos(2.0 * M_PI * (s - 0.5) / 1.5)) : 0.0;
   double wave = s > 0.0 && s < END_S ? sin(2.0 * M_PI * 2.0 * s + M_PI * which) : 0.0;
   double taps = wave > 0.0 ? wave * wave : 0.0;

@@ -77,8 +77,6 @@ hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, h
 void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out);
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                   const hap_twist *twist);
-/* [control] Added, and without a target yet: it is of another session, and nothing is told of it. */
-void hapi_haptic_set_foreign(hapi_haptic *haptic, hap_pointer_id id);
 /* The same; from the first time on, of the loop, the target goes on as fast, for the second one;
  * then it stands. */
 hap_status hapi_haptic_carry_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,

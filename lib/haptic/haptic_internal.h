@@ -47,7 +47,6 @@ typedef struct hapi_pointer_slot {
   void *self;
   hapi_effector *effector; /* NULL: likewise */
   bool has_device;         /* also in a replay, where there are no ops */
-  bool foreign;            /* see hapi_pointer */
   bool started;
   hap_device_info info;
   hap_axis_info axes[HAP_AXES_MAX]; /* info.axis_count */

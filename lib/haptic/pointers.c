@@ -35,7 +35,7 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   haptic->tick.pointers.high =
       index >= haptic->tick.pointers.high ? index + 1 : haptic->tick.pointers.high;
   p->generation = slot->generation;
-  p->foreign = slot->foreign;
+  p->handle.foreign = def->foreign != 0;
   slot->set.shape = 0;
   hapi_pointer_set_shape(haptic, index);
   p->device.three_dof = slot->has_device && info->dof < 6;
@@ -550,7 +550,6 @@ hapi_pointer_slot *hapi_slot_lock(hapi_haptic *haptic, hap_pointer_id id)
 static void fill_slot(hapi_pointer_slot *slot, const hapi_pointer_setup *def)
 {
   slot->def = *def;
-  slot->foreign = false;
   slot->def.hull_xyz = NULL;
   memset(&slot->hull, 0, sizeof slot->hull);
   slot->hull.count = (uint32_t)def->hull_points;
@@ -773,13 +772,6 @@ hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const 
     target.twist = *twist;
   }
   return target_set(haptic, id, &target);
-}
-
-void hapi_haptic_set_foreign(hapi_haptic *haptic, hap_pointer_id id)
-{
-  hapi_pointer_slot *slot = find_slot(haptic, id);
-  HAPI_ASSERT(slot != NULL && !hapi_triple_is_fresh(&slot->target_buffer));
-  slot->foreign = true;
 }
 
 hap_status hapi_haptic_carry_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,

@@ -141,6 +141,7 @@ typedef struct hapi_pointer_glides {
 
 /* Where the device is in the world. */
 typedef struct hapi_pointer_handle {
+  bool foreign; /* of another session's device: the application does not hear of it */
   double position[3];
   double velocity[3];
   double quat[4];
@@ -228,7 +229,6 @@ typedef struct hapi_pointer {
   uint32_t contacts;   /* that push */
   bool proxied;        /* it is a proxy, of whatever coupling */
   bool rigid;          /* one whose contacts do not give: god-object and virtual tool */
-  bool foreign;        /* of another session: the application does not hear of it */
   bool own;            /* it has own forces: tick/own_forces.h */
   bool has_axes;       /* pointer/axes.h */
   bool drives;         /* outputs beside the wrench were set: tick/outputs.h */

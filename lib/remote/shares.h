@@ -7,8 +7,8 @@
  * sync are an island. An island that hands of one guest reach is that guest's. One that hands of
  * several guests reach is moved by the world's own loop, with all these hands; each of the guests
  * has a copy. It stays so until no hand reaches it: a change of the loop is a change of the body's
- * place by what messages take. Where the guest that moves an island holds a body of it, or the world
- * has no loop of its own, one guest moves it, and it is a moved wall for the others. */
+ * place by what messages take. Where the guest that moves an island holds a body of it, or the
+ * world has no loop of its own, one guest moves it, and it is a moved wall for the others. */
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -144,10 +144,10 @@ static uint64_t hand_add(void *of, const hapi_model_hand *hand)
     return 0;
   }
   setup.coupling = HAP_COUPLING_DIRECT;
+  setup.foreign = 1;
   if (hapi_haptic_add_pointer(of, &setup, &id, &why) < HAP_OK) {
     return 0;
   }
-  hapi_haptic_set_foreign(of, id);
   return id.v;
 }
 

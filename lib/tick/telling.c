@@ -452,7 +452,7 @@ void hapi_telling_follow(hapi_telling *telling, const hapi_tick *tick, bool even
     if (at.pointer->generation == 0) {
       grab_follow(&at);
     }
-    uint32_t generation = at.pointer->foreign ? 0 : at.pointer->generation;
+    uint32_t generation = at.pointer->handle.foreign ? 0 : at.pointer->generation;
     if (at.list->generation != generation) {
       list_leave(&at);
       at.list->generation = generation;
