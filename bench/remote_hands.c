@@ -90,6 +90,7 @@ static hap_status side_create(const hands_stage *stage, hands_side *side)
   session_defs_init(&def, &expert, &research);
   def.drive = HAP_DRIVE_LOCKSTEP;
   def.physics_hz = 60.0;
+  def.model = stage->run->delay_s == REMOTE_HANDS_ODE ? HAP_MODEL_SINGLE : HAP_MODEL_CONTACT;
   research.guard = HAP_GUARD_MEASURE; /* the force before it is the one to compare */
   def.max_bodies = 8;
   def.max_contacts = 64;
@@ -109,7 +110,8 @@ static hap_status server_open(hands_stage *stage)
   dWorldSetGravity(side->world, 0.0, 0.0, -9.81);
   dWorldSetCFM(side->world, 1e-12);
   dWorldSetContactSurfaceLayer(side->world, 1e-4);
-  dWorldSetQuickStepNumIterations(side->world, 100);
+  dWorldSetQuickStepNumIterations(side->world,
+                                  stage->run->delay_s == REMOTE_HANDS_ODE ? 1000 : 100);
   dCreatePlane(side->space, 0.0, 0.0, 1.0, 0.0);
   stage->cube = dBodyCreate(side->world);
   dMassSetBoxTotal(&mass, MASS, EDGE, EDGE, EDGE);

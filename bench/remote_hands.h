@@ -13,6 +13,7 @@
 #define REMOTE_HANDS_TICKS 4500 /* 1 s to join, 2.5 s to move, 1 s to come to rest */
 #define REMOTE_HANDS_BEGIN 1000
 #define REMOTE_HANDS_HERE (-1.0) /* s of delay: in the world's session */
+#define REMOTE_HANDS_ODE (-2.0)  /* the same, and ODE alone at 1 kHz with 1000 iterations */
 
 typedef enum remote_task {
   REMOTE_SQUEEZE, /* from both sides */

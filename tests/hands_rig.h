@@ -27,6 +27,8 @@ typedef struct hands_rig {
   hap_session *session; /* of the world */
   hap_link *link;       /* NULL: hands are in that session */
   double delay;         /* s, one way */
+  double jitter;        /* s, 0 at first */
+  double loss;          /* likewise; as many come twice */
   hap_session_def def;
   hap_expert_def expert;
   hap_research_def research;
@@ -96,6 +98,9 @@ static inline void rig_join(hands_rig *r, int which, const hap_pointer_def *def)
     hap_link_path_def path;
     hap_link_path_def_init(&path, sizeof path);
     path.delay = r->delay;
+    path.jitter = r->jitter;
+    path.loss = path.duplicate = r->loss;
+    path.seed = (uint64_t)which + 1;
     ode_world_make(0.0, &hand->world, &hand->space);
     hap_ode_def_init(&ode, sizeof ode);
     ode.world = hand->world;

@@ -90,6 +90,11 @@ TEST_EACH(tasks, const shared_case *row)
     reference =
         (remote_hands){.task = row->what, .grip = (remote_grip)g, .delay_s = REMOTE_HANDS_HERE};
     task_run(&reference);
+    run = (remote_hands){.task = row->what, .grip = (remote_grip)g, .delay_s = REMOTE_HANDS_ODE};
+    task_run(&run);
+    printf("# %s, %s, ODE alone at 1 kHz: the reference is off by %.3f\n", row->name,
+           remote_grips[g], remote_hands_error(&reference, &run));
+    CHECK(remote_hands_error(&reference, &run) <= 0.05);
     for (int d = 0; d < 4; ++d) {
       run = (remote_hands){.task = row->what, .grip = (remote_grip)g, .delay_s = delays[d]};
       task_run(&run);
@@ -243,6 +248,84 @@ TEST(a_session_that_dies_is_not_felt_by_the_other_one)
   CHECK(step < 0.02);
   CHECK_NEAR(before[2], 6.0, 0.1);
   CHECK(rig_state(r->session).joined == 1);
+}
+
+/* Four hands, one of them a cube, go about at random in a pile with a hinge; they come and go, and
+ * messages are lost, doubled and late. Nothing flies off, and what hands gave is counted. */
+TEST(hands_that_come_and_go_in_a_pile_do_no_harm)
+{
+  static const double corners[8][3] = {
+      {-0.01, -0.01, -0.01}, {0.01, -0.01, -0.01}, {-0.01, 0.01, -0.01}, {0.01, 0.01, -0.01},
+      {-0.01, -0.01, 0.01},  {0.01, -0.01, 0.01},  {-0.01, 0.01, 0.01},  {0.01, 0.01, 0.01}};
+  hands_rig *r = rig_new(0.03, 6);
+  dBodyID bodies[8];
+  unsigned random = 12345;
+  double wish[4][3];
+  double at[4][3];
+  r->jitter = 0.02;
+  r->loss = 0.05;
+  r->expert.look_ahead = 0.2;
+  r->def.max_contacts = 512;
+  dCreatePlane(r->space, 0.0, 0.0, 1.0, 0.0);
+  for (int i = 0; i < 8; ++i) {
+    bodies[i] = ode_box(r->world, r->space, 0.2 + 0.1 * i, AT(0.06, 0.06, 0.06),
+                        AT(0.07 * (i % 4), 0.03 * (i / 4), 0.031 + 0.061 * (i / 4)));
+  }
+  dJointID hinge = dJointCreateHinge(r->world, NULL);
+  dJointAttach(hinge, bodies[0], bodies[1]);
+  dJointSetHingeAnchor(hinge, 0.035, 0.0, 0.031);
+  dJointSetHingeAxis(hinge, 0.0, 0.0, 1.0);
+  rig_serve(r, cube_surface);
+  session_run(r->session);
+  for (int t = 0; t < 12000; ++t) {
+    for (int i = 0; i < 4; ++i) {
+      random = random * 1103515245u + 12345u;
+      bool here = r->hands[i].session != NULL;
+      if (t % 1000 == 250 * i && (!here || random >> 29 == 0)) {
+        hap_pointer_def hand;
+        rig_leave(r, i);
+        hap_pointer_def_init(&hand, sizeof hand);
+        hand.stiffness = 800.0;
+        hand.friction = 0.4;
+        hand.radius = i == 3 ? 0.002 : 0.01;
+        hand.hull_xyz = i == 3 ? corners[0] : NULL;
+        hand.hull_points = i == 3 ? 8 : 0;
+        rig_join(r, i, &hand);
+        hapi_v3_set(at[i], -0.2, 0.3 * i - 0.4, 0.3);
+        hapi_v3_copy(at[i], wish[i]);
+      }
+      if (r->hands[i].session == NULL) {
+        continue;
+      }
+      if (t % 400 == 100 * i) {
+        hapi_v3_set(wish[i], 0.3 * ((random >> 8) % 1000) / 1000.0 - 0.03,
+                    0.2 * ((random >> 12) % 1000) / 1000.0 - 0.08,
+                    0.15 * ((random >> 16) % 1000) / 1000.0);
+      }
+      double v[3];
+      for (int k = 0; k < 3; ++k) {
+        v[k] = fmin(fmax(5.0 * (wish[i][k] - at[i][k]), -0.3), 0.3);
+        at[i][k] += 1e-3 * v[k];
+      }
+      rig_put(r, i, at[i], v);
+    }
+    rig_tick(r);
+    for (int i = 0; i < 8; ++i) {
+      const dReal *place = dBodyGetPosition(bodies[i]);
+      REQUIRE(hapi_v3_norm(place) < 3.0 && place[2] > -0.02);
+      REQUIRE(hapi_v3_norm(dBodyGetLinearVel(bodies[i])) < 5.0);
+    }
+  }
+  hap_remote_state state = rig_state(r->session);
+  hap_stats stats = session_stats(r->session);
+  printf("# %llu joined, %llu shared, momentum %.2g N s not there, %llu rejected\n",
+         (unsigned long long)state.joins, (unsigned long long)state.shared,
+         stats.hand.momentum_error_ns, (unsigned long long)stats.faults.states_rejected);
+  CHECK(state.joins > 6 && state.refused == 0 && state.bounded == 0 && state.turned_away == 0);
+  CHECK(stats.faults.states_rejected == 0);
+  for (int i = 0; i < 4; ++i) {
+    CHECK(r->hands[i].session == NULL || session_stats(r->hands[i].session).faults.count == 0);
+  }
 }
 
 /* ---- momentum ---- */
