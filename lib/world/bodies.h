@@ -50,6 +50,7 @@ typedef struct hapi_posed_way {
 /* What a step does not read for a body that is far from the pointers and has not changed. */
 typedef struct hapi_known_rest {
   uint64_t birth; /* number of this life of the entry, from 1: addresses come again */
+  uint64_t name;  /* its first birth: stays where it is renewed */
   bool adopted;
   double user_force[3]; /* accumulators before the last global step */
   double user_torque[3];
@@ -139,6 +140,8 @@ void hapi_bodies_finish(hapi_body_table *table);
 uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_NONE */
 /* By the birth of its entry; HAPI_NONE: it is gone. */
 uint32_t hapi_bodies_find_birth(const hapi_body_table *table, uint64_t birth);
+/* Likewise, by its name. */
+uint32_t hapi_bodies_find_name(const hapi_body_table *table, uint64_t name);
 /* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. syncs: once in a
  * cycle, when what the application has moved counts. */
 hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle, bool syncs);
