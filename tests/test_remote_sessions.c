@@ -757,3 +757,46 @@ TEST(what_the_world_decides_is_not_set_in_the_hand_s_session)
   CHECK(hap_session_set_model(world->session, HAP_MODEL_SINGLE) == HAP_ERROR_UNSUPPORTED);
   CHECK(strstr(side_detail(world), "only contact") != NULL);
 }
+
+/* The application draws, and edits its own world, while messages come; the threads share nothing
+ * without a lock (this test is for the sanitizer as well). */
+TEST(in_threads_the_world_is_drawn_while_it_moves)
+{
+  static cable cables[2];
+  side *world = side_new(HAP_DRIVE_THREADS);
+  side *hand = side_new(HAP_DRIVE_THREADS);
+  side_create(world, true);
+  side_create(hand, true);
+  dBodyID balls[2] = {side_add_ball(world), side_add_ball(hand)};
+  side_add_hand(hand);
+  side_put(hand, 3.0);
+  cables_open(cables);
+  REQUIRE(hap_link_create(&cable_ops, &cables[0], &world->link, NULL) == HAP_OK);
+  REQUIRE(hap_link_create(&cable_ops, &cables[1], &hand->link, NULL) == HAP_OK);
+  REQUIRE(hap_session_serve(world->session, world->link) == HAP_OK);
+  REQUIRE(hap_session_connect(hand->session, hand->link) == HAP_OK);
+  REQUIRE(hap_session_start(world->session) >= HAP_OK);
+  REQUIRE(hap_session_start(hand->session) >= HAP_OK);
+  for (int i = 0; i < 5000 && side_state(hand).drawn == 0; ++i) {
+    usleep(1000);
+  }
+  CHECK(side_state(hand).drawn == 1);
+  CHECK(hap_session_lock(world->session) == HAP_OK);
+  dBodySetLinearVel(balls[0], ROLL, 0.0, 0.0);
+  CHECK(hap_session_unlock(world->session) == HAP_OK);
+  double before = 0.0;
+  int back = 0;
+  for (int i = 0; i < 10000 && before < 0.1; ++i) {
+    hap_body_role role;
+    double x = pose_x(hand, balls[1], hap_session_now(hand->session), &role);
+    back += x < before - 1e-9;
+    before = x;
+    if (i % 50 == 0) {
+      CHECK(hap_session_lock(hand->session) == HAP_OK);
+      CHECK(hap_session_unlock(hand->session) == HAP_OK);
+    }
+    usleep(1000);
+  }
+  CHECK(before >= 0.1 && back == 0);
+  CHECK(side_state(hand).refused == 0);
+}
