@@ -216,7 +216,8 @@ def refused_check():
              ("--insecure", 2, "only with --serve or --connect"),
              ("--serve a*b", 2, "name of the world"),
              ("--serve a --peers 10.0.0.1", 2, "certificates"),
-             ("--serve a --insecure --interface none0 --dds-domain 71", 1, "interface"),
+             ("--serve a --insecure --interface none0 --dds-domain 71", 1,
+              "hapode-run: DDS: none0: does not match an available interface"),
              ("--connect a --certificates /nowhere --dds-domain 72", 2, "identity_ca.pem"))
     for arguments, code, text in cases:
         run = Run(*arguments.split(), "--seconds", "0.1")
