@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
+#include "base/vec.h"
 
 hap_status hapi_loop_end_begin(hapi_loop_end *loop)
 {
@@ -170,12 +171,15 @@ void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns)
 {
   unsigned char question[HAPI_STAMPS_QUESTION];
   loop->end.now_ns = now_ns;
-  if (loop->agreed && !loop->limits_told) {
+  bool grows = loop->limits.force > loop->told.force || loop->limits.speed > loop->told.speed;
+  if (loop->agreed && (grows || !loop->terms_told)) {
     hapi_terms own = loop->terms;
     own.limits = loop->limits;
     own.draws = loop->draws && loop->scene.bodies > 0;
     hapi_end_send_terms(&loop->end, &own);
-    loop->limits_told = true;
+    loop->told.force = hapi_max(loop->told.force, loop->limits.force);
+    loop->told.speed = hapi_max(loop->told.speed, loop->limits.speed);
+    loop->terms_told = true;
   }
   if (loop->agreed && hapi_stamps_ask(&loop->stamps, now_ns, question)) {
     hapi_end_send_stamps(&loop->end, question, sizeof question);

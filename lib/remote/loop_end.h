@@ -30,7 +30,8 @@ typedef struct hapi_loop_end {
   bool agreed;             /* terms have come, and are good */
   hapi_terms terms;        /* before: what the loop has */
   hapi_limits limits;      /* of the session's pointers */
-  bool limits_told;        /* to the world */
+  hapi_limits told;        /* to the world: the largest, which it keeps to */
+  bool terms_told;         /* it has heard of this session */
   bool turned_away;        /* by the world, end.detail says why */
   uint64_t number;         /* of the newest model given */
   uint64_t old;            /* models that came behind a newer one */

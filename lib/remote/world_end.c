@@ -199,7 +199,7 @@ void hapi_world_end_send(hapi_world_end *world, int64_t now_ns)
   void *const messages[2] = {model, near};
   world->end.now_ns = now_ns;
   if (model != NULL) {
-    hapi_bound_note(&world->bound, model);
+    hapi_bound_note(&world->bound, model, near);
   }
   if (model != NULL && near != NULL) {
     hapi_end_send(&world->end, messages);

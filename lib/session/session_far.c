@@ -193,17 +193,25 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
 #define REACH_M 0.1 /* a hand presses a pointer no farther into what does not give way */
 
 /* A body gets what the pointer's spring gives, also where the device gives less to the hand. */
-void hapi_session_allow(hap_session *session, const hapi_pointer_setup *setup)
+hapi_limits hapi_session_limits_of(const hapi_pointer_setup *setup)
 {
   double felt = setup->force_scale > 0.0 ? setup->max_force / setup->force_scale : 0.0;
+  return (hapi_limits){.force = hapi_max(felt, REACH_M * setup->stiffness),
+                       .speed = HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale};
+}
+
+void hapi_session_allow(hap_session *session, const hapi_limits *more)
+{
   hapi_far *far = session->ferry.far;
-  session->ferry.limits.force += hapi_max(felt, REACH_M * setup->stiffness);
-  session->ferry.limits.speed =
-      hapi_max(session->ferry.limits.speed, HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale);
+  pthread_mutex_lock(&session->detail_lock); /* it is for one short text, and short enough */
+  hapi_limits *sum = &session->ferry.limits;
+  sum->force = hapi_max(sum->force + more->force, 0.0);
+  sum->speed = hapi_max(sum->speed, more->speed);
+  const hapi_limits now = *sum;
+  pthread_mutex_unlock(&session->detail_lock);
   if (far != NULL) {
     pthread_mutex_lock(&far->lock);
-    far->loop.limits = session->ferry.limits;
-    far->loop.limits_told = false;
+    far->loop.limits = now;
     pthread_mutex_unlock(&far->lock);
   }
 }

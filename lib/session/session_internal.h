@@ -144,8 +144,11 @@ typedef struct hapi_far {
  * Errors as above, and HAP_ERROR_MEMORY. */
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
 void hapi_far_finish(hapi_far *far); /* begun before */
-/* Another pointer can do so much more. */
-void hapi_session_allow(hap_session *session, const hapi_pointer_setup *setup);
+/* What a pointer can do to a world. */
+hapi_limits hapi_session_limits_of(const hapi_pointer_setup *setup);
+/* [any] The pointers together can do so much more, in force that may be less than 0; a world far
+ * away is told. */
+void hapi_session_allow(hap_session *session, const hapi_limits *more);
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */
