@@ -48,9 +48,9 @@ static const program programs[] = {
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
     {"hosting", bench_hosting,
-     "what a world costs whoever serves it: share of a core, memory, bytes; by hapode-run --serve "
-     "and\n"
-     "             --connect; --scene NAME"},
+     "what a world costs whoever serves it to a hand in another process: share of a core, memory, "
+     "bytes;\n"
+     "             --scene NAME"},
     {"impedance", bench_impedance,
      "what the hand feels at the port from 0.5 to 200 Hz, and the stiffest wall of each device; "
      "--coupling\n"
