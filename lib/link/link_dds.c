@@ -178,7 +178,10 @@ static hap_status dds_open(const hap_link_dds_def *given, uint32_t serves, hap_l
   *out = NULL;
   HAPI_TRY(hapi_def_read_optional(&def_type, given, &def, why));
   HAPI_TRY(def_check(&def, why));
-  HAPI_TRY(module_open(def.module, &module, why));
+  hap_status status = module_open(def.module, &module, why);
+  if (status < HAP_OK || module == NULL) {
+    return status;
+  }
   HAPI_TRY(module->open(&def, serves, &self, why));
   return hap_link_create(module->ops, self, out, why);
 }
