@@ -158,6 +158,7 @@ hap_status hapi_bodies_set_moved_callback(hapi_world *world, const hapi_cycle *c
 bool hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms have changed: true */
 /* m/s, of its surface; 0 for one that sleeps */
 double hapi_extent_speed(const hapi_known_body *known);
+bool hapi_extent_is_still(const hapi_known_body *known); /* now, and for some cycles before */
 /* At a sync, after a step of that length: how a body that is moved by its pose goes. */
 void hapi_extent_follow_way(hapi_known_body *known, double seconds);
 /* ODE's twist, or that of its poses. */
