@@ -25,6 +25,7 @@ hap_status hapi_world_end_begin(hapi_world_end *world)
 void hapi_world_end_finish(hapi_world_end *world)
 {
   hapi_bound_finish(&world->bound);
+  hapi_scenery_finish(&world->scenery);
   hapi_free(world->store);
   world->store = world->last = NULL;
 }
@@ -82,8 +83,9 @@ static void client_join(hapi_world_end *world, uint32_t peer)
 {
   world->end.joined = true;
   world->end.peer = peer;
-  world->admitted = false;
+  world->admitted = world->draws = false;
   world->bounded_ns = 0;
+  hapi_scenery_reset(&world->scenery);
   hapi_bound_reset(&world->bound, world->end.now_ns);
   world->tick = 0;
   world->end.codec.reset(world->end.codec.self);
@@ -113,6 +115,7 @@ static void client_admit(hapi_world_end *world, const hap_link_event *event)
     client_turn_away(world, &why);
   } else {
     world->admitted = true;
+    world->draws = terms.draws;
     hapi_bound_allow(&world->bound, &terms.limits);
   }
 }
@@ -196,9 +199,13 @@ void hapi_world_end_send(hapi_world_end *world, int64_t now_ns)
   void *const messages[2] = {model, near};
   world->end.now_ns = now_ns;
   if (model != NULL) {
-    hapi_bound_note(&world->bound, model);
+    hapi_bound_note(&world->bound, model, near);
   }
   if (model != NULL && near != NULL) {
     hapi_end_send(&world->end, messages);
+  }
+  if (world->end.joined && world->draws && world->bodies.read != NULL) {
+    const hapi_scenery_out out = {&world->end, hapi_end_send_scenery};
+    (void)hapi_scenery_step(&world->scenery, &world->bodies, &out); /* without memory: later */
   }
 }

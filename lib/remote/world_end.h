@@ -16,6 +16,9 @@ typedef struct hapi_world_end {
   hapi_terms terms;        /* for whoever joins */
   void (*renew)(void *of); /* of physics: the totals of another loop begin at zero */
   void *renew_of;
+  hapi_scenery_source bodies; /* for a client that draws them; members may be NULL */
+  hapi_scenery scenery;
+  bool draws;        /* the client does */
   uint64_t tick;     /* of the newest state given */
   uint64_t old;      /* states that came behind a newer one */
   hapi_state *last;  /* the newest state given, while there is a client; else NULL */

@@ -125,6 +125,39 @@ static void network_stop(hap_session *session)
   hapi_thread_join(&session->ferry.far->thread);
 }
 
+/* ---- who draws ---- */
+
+static uint32_t far_places(void *of)
+{
+  return hapi_physics_places(of);
+}
+
+static void far_tell(void *of, uint32_t first, uint32_t count, hapi_told_body *out)
+{
+  hapi_physics_tell(of, first, count, out);
+}
+
+static void far_hear(void *of, uint64_t number, const hapi_told_body *bodies, uint32_t count)
+{
+  hapi_physics_hear(of, number, bodies, count);
+}
+
+static void far_draw(void *of, hapi_model *model, double period_s, const int64_t times_ns[2])
+{
+  hapi_physics_draw(of, model, period_s, times_ns);
+}
+
+static hap_status far_begin(hap_session *session, int64_t start_ns)
+{
+  hapi_far *far = session->ferry.far;
+  if (session->ferry.side == HAPI_SIDE_LOOP) {
+    HAPI_TRY(hapi_physics_begin_drawing(session->physics, start_ns));
+  }
+  hapi_physics_print_scene(session->physics, &far->loop.scene);
+  far->world.terms.scene = far->loop.scene;
+  return HAP_OK;
+}
+
 static void far_renew(void *of)
 {
   hapi_physics_renew_loop(of);
@@ -144,6 +177,10 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
   far->world.exchange = apart != NULL ? apart : session->exchange;
   far->world.renew = far_renew;
   far->world.renew_of = session->physics;
+  far->world.bodies = (hapi_scenery_source){session->physics, far_places, far_tell};
+  if (session->ferry.side == HAPI_SIDE_LOOP) {
+    far->loop.view = (hapi_loop_view){session->physics, far_hear, far_draw};
+  }
   far->loop.exchange = session->exchange;
   far->lockstep = def->drive == HAP_DRIVE_LOCKSTEP;
   pthread_mutex_init(&far->lock, NULL);
@@ -156,17 +193,25 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
 #define REACH_M 0.1 /* a hand presses a pointer no farther into what does not give way */
 
 /* A body gets what the pointer's spring gives, also where the device gives less to the hand. */
-void hapi_session_allow(hap_session *session, const hapi_pointer_setup *setup)
+hapi_limits hapi_session_limits_of(const hapi_pointer_setup *setup)
 {
   double felt = setup->force_scale > 0.0 ? setup->max_force / setup->force_scale : 0.0;
+  return (hapi_limits){.force = hapi_max(felt, REACH_M * setup->stiffness),
+                       .speed = HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale};
+}
+
+void hapi_session_allow(hap_session *session, const hapi_limits *more)
+{
   hapi_far *far = session->ferry.far;
-  session->ferry.limits.force += hapi_max(felt, REACH_M * setup->stiffness);
-  session->ferry.limits.speed =
-      hapi_max(session->ferry.limits.speed, HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale);
+  pthread_mutex_lock(&session->detail_lock); /* it is for one short text, and short enough */
+  hapi_limits *sum = &session->ferry.limits;
+  sum->force = hapi_max(sum->force + more->force, 0.0);
+  sum->speed = hapi_max(sum->speed, more->speed);
+  const hapi_limits now = *sum;
+  pthread_mutex_unlock(&session->detail_lock);
   if (far != NULL) {
     pthread_mutex_lock(&far->lock);
-    far->loop.limits = session->ferry.limits;
-    far->loop.limits_told = false;
+    far->loop.limits = now;
     pthread_mutex_unlock(&far->lock);
   }
 }
@@ -182,6 +227,7 @@ hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *
     ferry.before_tick = far_before_tick;
     ferry.after_tick = far_after_tick;
   }
+  ferry.begin = side != HAPI_SIDE_BOTH ? far_begin : NULL;
   if (side == HAPI_SIDE_LOOP) {
     ferry.start = network_start;
     ferry.stop = network_stop;

@@ -125,7 +125,8 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
     status = hapi_haptic_add_pointer(session->haptic, &setup, out, &detail);
   }
   if (status >= HAP_OK) {
-    hapi_session_allow(session, &setup);
+    const hapi_limits limits = hapi_session_limits_of(&setup);
+    hapi_session_allow(session, &limits);
   }
   return hapi_session_note(session, status, &detail);
 }
@@ -149,9 +150,15 @@ hap_status hapi_session_say_why_not(const hap_session *session, hap_pointer_id p
 
 hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer)
 {
+  hapi_pointer_setting setting;
   HAPI_TRY(hapi_session_may_change(session));
-  return hapi_session_say_why_not(session, pointer,
-                                  hapi_haptic_remove_pointer(session->haptic, pointer));
+  bool known = hapi_haptic_get_settings(session->haptic, pointer, &setting) >= HAP_OK;
+  hap_status status = hapi_haptic_remove_pointer(session->haptic, pointer);
+  if (status >= HAP_OK && known) {
+    const hapi_limits less = {.force = -hapi_session_limits_of(&setting.def).force};
+    hapi_session_allow(session, &less);
+  }
+  return hapi_session_say_why_not(session, pointer, status);
 }
 
 hap_status hap_pointer_restart(hap_session *session, hap_pointer_id pointer)

@@ -86,7 +86,9 @@ enum {
    * contact's a. */
   HAPI_BODY_WHOLE = 128,
   /* Of one outside of the range: the world beyond it takes up some of the loop's push. */
-  HAPI_BODY_BRACED = 512
+  HAPI_BODY_BRACED = 512,
+  /* It has been at rest for a while: its velocity is what a solver leaves, which rocks it. */
+  HAPI_BODY_STILL = 1024
 };
 
 /* A slower body gets no gyroscopic term, which would change its rotation in a tick by a
