@@ -49,6 +49,7 @@ hap_status bench_faults(bench *b);
 hap_status bench_fig5(bench *b);
 hap_status bench_fig6(bench *b);
 hap_status bench_fig7(bench *b);
+hap_status bench_hosting(bench *b);
 hap_status bench_impedance(bench *b);
 hap_status bench_input(bench *b);
 hap_status bench_jitter(bench *b);

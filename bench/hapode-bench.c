@@ -47,6 +47,10 @@ static const program programs[] = {
     {"fig5", bench_fig5, "the paper's Fig. 5: force of a cube that runs into a fixed pointer"},
     {"fig6", bench_fig6, "the paper's Fig. 6: duty factors while one cube is pushed"},
     {"fig7", bench_fig7, "the paper's Fig. 7: duty factors while ten cubes are pushed, and more"},
+    {"hosting", bench_hosting,
+     "what a world costs whoever serves it to a hand in another process: share of a core, memory, "
+     "bytes;\n"
+     "             --scene NAME"},
     {"impedance", bench_impedance,
      "what the hand feels at the port from 0.5 to 200 Hz, and the stiffest wall of each device; "
      "--coupling\n"
@@ -198,7 +202,7 @@ static bool options_fit(const program *p, const bench *b)
                strcmp(b->estimates, "default") == 0;
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
       p->run != bench_effects && p->run != bench_faults && p->run != bench_late &&
-      p->run != bench_peers && p->run != bench_remote) {
+      p->run != bench_peers && p->run != bench_remote && p->run != bench_hosting) {
     wrong = "has no scenes to choose from";
   } else if (b->random_worlds > 0 && (p->run != bench_faults || b->scene != NULL)) {
     wrong = "has no random worlds: --random is for faults, without --scene";

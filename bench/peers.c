@@ -17,7 +17,7 @@
 
 #define PEERS_COLUMNS                                                           \
   "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode" \
-  ",iterations,peak_n,rest_mm,asleep,repeats,haptic_hz,tick_us,contact_us,physics_us"
+  ",iterations,peak_n,rest_mm,asleep,repeats,haptic_hz,tick_us,contact_us,physics_us,truth_floor"
 
 #define REPEATS 5
 #define REPEATS_QUICK 3
@@ -26,6 +26,7 @@
 #define RATE_HZ_MOST 20000.0
 #define TRUTH_ITERATIONS 1000
 #define TRUTH_BOXES_MOST 100 /* larger worlds take a truth too long */
+#define NUDGE 1e-7           /* m: single precision at 1 m still tells it */
 #define APART_TRUTH_BOXES 10 /* nothing but the floor touches the one that the hand meets */
 #define SLEEP_SETTLE_S 0.8   /* until all sleep */
 #define FIRST_WITHIN 0.1     /* of ODE's force while friction holds the box */
@@ -81,6 +82,7 @@ typedef struct peers_row {
   double parts[3];  /* us a ms: ticks, contact passes, cycles; NaN: of an engine */
   double error;     /* NaN: not known */
   double error_ode; /* likewise */
+  double floor;     /* of the truth that error is against; NaN: not known */
   double first;     /* at the begin of the touch, of ODE's; NaN: not known */
   size_t asleep;
   int repeats;
@@ -141,8 +143,15 @@ static hap_status row_run(bench *b, const peers_row *row, const peer_world *worl
   return peers_run_engine(b, engine, world, &setting, out);
 }
 
-/* Without one there is no force. */
-static hap_status truth_run(bench *b, const peer_engine *engine, const peers_case *of,
+static void world_nudge(peer_world *world, double way)
+{
+  for (size_t i = 0; i < world->count; ++i) {
+    world->boxes[i].at[i % 2] += i / 2 % 2 == 0 ? way : -way;
+  }
+}
+
+/* Without one there is no force. nudge: m, how far boxes are aside at the begin. */
+static hap_status truth_run(bench *b, const peer_engine *engine, const peers_case *of, double nudge,
                             peers_run *out)
 {
   peer_world world;
@@ -156,26 +165,50 @@ static hap_status truth_run(bench *b, const peer_engine *engine, const peers_cas
                          &world)) {
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %s", of->world);
   }
+  world_nudge(&world, nudge);
   hap_status status = peers_run_engine(b, engine, &world, &setting, out);
   peer_world_destroy(&world);
   return status;
 }
 
-static hap_status row_judge(bench *b, const peer_world *world, const peers_run *ode_truth,
+/* How far it is from itself where each box begins a little aside: no error below that says
+ * anything. */
+typedef struct peers_truth {
+  peers_run run;
+  double floor; /* of the force; NaN: not known */
+} peers_truth;
+
+static hap_status truth_find(bench *b, const peer_engine *engine, const peers_case *of,
+                             peers_truth *out)
+{
+  peers_run aside = {0};
+  memset(out, 0, sizeof *out);
+  hap_status status = truth_run(b, engine, of, 0.0, &out->run);
+  if (status >= HAP_OK) {
+    status = truth_run(b, engine, of, NUDGE, &aside);
+  }
+  out->floor = status >= HAP_OK && aside.force != NULL ? peers_run_error(&aside, &out->run) : NAN;
+  peers_run_free(&aside);
+  return status;
+}
+
+static hap_status row_judge(bench *b, const peer_world *world, const peers_truth *ode,
                             peers_row *row)
 {
   const peer_engine *engine = row->who->engine;
-  peers_run truth = {0};
+  peers_truth own = {{0}};
   hap_status status = HAP_OK;
   row->first = (double)NAN;
-  if (ode_truth->force != NULL) {
-    row->first = peers_run_first(world, &row->run) / peers_run_first(world, ode_truth);
+  if (ode->run.force != NULL) {
+    row->first = peers_run_first(world, &row->run) / peers_run_first(world, &ode->run);
   }
-  row->error = row->error_ode = peers_run_error(&row->run, ode_truth);
+  row->error = row->error_ode = peers_run_error(&row->run, &ode->run);
+  row->floor = ode->floor;
   if (engine != NULL && engine != &peer_ode) {
-    status = truth_run(b, engine, &row->of, &truth);
-    row->error = status >= HAP_OK ? peers_run_error(&row->run, &truth) : (double)NAN;
-    peers_run_free(&truth);
+    status = truth_find(b, engine, &row->of, &own);
+    row->error = status >= HAP_OK ? peers_run_error(&row->run, &own.run) : (double)NAN;
+    row->floor = own.floor;
+    peers_run_free(&own.run);
   }
   return status;
 }
@@ -268,6 +301,7 @@ static void row_write(FILE *csv, const peers_row *r)
   for (int k = 0; k < 3; ++k) {
     number_write(csv, r->parts[k]);
   }
+  number_write(csv, r->floor);
   fputc('\n', csv);
 }
 
@@ -284,14 +318,16 @@ static void row_report(bench *b, const peers_row *r)
 {
   char error[32];
   char error_ode[32];
+  char floor[32];
   char name[64];
   size_t asleep = world_sleeps(r->of.world) ? (size_t)r->of.bodies : 0;
   error_text(r->error, error, sizeof error);
   error_text(r->error_ode, error_ode, sizeof error_ode);
+  error_text(r->floor, floor, sizeof floor);
   snprintf(name, sizeof name, "%s:%d@%g, %s %g Hz", r->of.world, r->of.bodies, r->of.haptic_hz,
            contestant_name(r->who), row_physics_hz(r));
-  bench_say("%-36s %8.1f us a ms, p99 %8.1f us, force %s, of ODE's %s", name, r->us_per_ms,
-            r->p99_us, error, error_ode);
+  bench_say("%-36s %8.1f us a ms, p99 %8.1f us, force %s (floor %s), of ODE's %s", name,
+            r->us_per_ms, r->p99_us, error, floor, error_ode);
   if (b->verify) {
     bench_check(b, isnan(r->first) || fabs(r->first - 1.0) <= FIRST_WITHIN,
                 "%s: first force %.3f of ODE's (bound %g)", name, r->first, FIRST_WITHIN);
@@ -333,7 +369,7 @@ static hap_status case_run(peers_bed *bed, FILE *csv, const peers_case *of)
 {
   bench *b = bed->bench;
   peer_world world;
-  peers_run ode_truth = {0};
+  peers_truth ode_truth = {{0}};
   peers_row *rows = &bed->rows[bed->row_count];
   size_t count = 0;
   if (!peer_world_create(of->world, of->bodies, &world)) {
@@ -355,14 +391,14 @@ static hap_status case_run(peers_bed *bed, FILE *csv, const peers_case *of)
     status = case_time(b, &world, rows, count);
   }
   if (status >= HAP_OK && count > 0) {
-    status = truth_run(b, &peer_ode, of, &ode_truth);
+    status = truth_find(b, &peer_ode, of, &ode_truth);
   }
   for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
     status = row_judge(b, &world, &ode_truth, &rows[i]);
     row_write(csv, &rows[i]);
     row_report(b, &rows[i]);
   }
-  peers_run_free(&ode_truth);
+  peers_run_free(&ode_truth.run);
   peer_world_destroy(&world);
   progress_add(1, case_cost(of));
   return status;

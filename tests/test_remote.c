@@ -58,13 +58,11 @@ static void run_or_bail(const bench *b, hap_status status)
   REQUIRE_SAY(status >= HAP_OK, "%s", b->detail.text);
 }
 
-/* Over the error beside the world. Until a hand has joined, ODE alone has the world: piles settle a
- * little otherwise in the few steps. */
+/* Over the error beside the world. Until a hand has joined, ODE alone has the world: a tower
+ * settles a little otherwise in the few steps, and leans earlier or later. */
 static double margin_of(const accuracy_scene *which)
 {
-  return strcmp(which->name, "tower") == 0  ? 0.012
-         : strcmp(which->name, "hold") == 0 ? 0.003
-                                            : 0.002;
+  return strcmp(which->name, "tower") == 0 ? 0.012 : 0.002;
 }
 
 /* As small as beside the world, whatever the way. */
@@ -124,6 +122,7 @@ typedef struct remote_case {
 static const remote_case cases[] = {{"slide", FARTHEST | LOSSY},
                                     {"stack", FARTHEST | LOSSY},
                                     {"door", LOSSY},
+                                    {"hold", FARTHEST}, /* a stack that rocks while it rests */
                                     {"hit", FARTHEST | LOSSY}};
 
 TEST_EACH(cases, const remote_case *row)

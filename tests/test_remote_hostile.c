@@ -310,6 +310,50 @@ TEST(a_loop_moves_what_it_was_given_and_nothing_else)
   }
 }
 
+static double limit_of(const server *s)
+{
+  return s->far.world.guests[0].bound.limits.force;
+}
+
+/* What is set while the session runs counts too; what falls is not told. */
+TEST(a_pointer_that_is_made_stiffer_later_may_push_more)
+{
+  server *s = server_open();
+  client *c = client_open(s, "hand", 1000.0, 8);
+  hap_pointer_settings settings;
+  hap_pointer_settings_init(&settings, sizeof settings);
+  ends_run(s, c, 300);
+  CHECK_NEAR(limit_of(s), 100.0, 1e-9); /* 0.1 m of 1000 N/m */
+  settings.mask = HAP_SET_STIFFNESS;
+  settings.stiffness = 2500.0;
+  CHECK(hap_pointer_set(c->session, c->hand, &settings) == HAP_OK);
+  ends_run(s, c, 300);
+  CHECK_NEAR(limit_of(s), 250.0, 1e-9);
+  settings.stiffness = 500.0;
+  for (int i = 0; i < 10; ++i) { /* to and fro, which adds up to nothing */
+    settings.stiffness = i % 2 == 0 ? 500.0 : 2500.0;
+    CHECK(hap_pointer_set(c->session, c->hand, &settings) == HAP_OK);
+  }
+  ends_run(s, c, 300);
+  CHECK_NEAR(limit_of(s), 250.0, 1e-9);
+  settings.mask = HAP_SET_LIMITS | HAP_SET_MOTION_SCALE | HAP_SET_FORCE_SCALE;
+  settings.max_force = settings.max_torque = 280.0;
+  settings.motion_scale = settings.force_scale = 1.0;
+  CHECK(hap_pointer_set(c->session, c->hand, &settings) == HAP_OK);
+  ends_run(s, c, 300);
+  CHECK_NEAR(limit_of(s), 280.0, 1e-9);
+  settings.mask = HAP_SET_STIFFNESS;
+  settings.stiffness = -1.0;
+  CHECK(hap_pointer_set(c->session, c->hand, &settings) == HAP_ERROR_ARGUMENT);
+  settings.stiffness = 9000.0; /* the world allows 300 N */
+  CHECK(hap_pointer_set(c->session, c->hand, &settings) == HAP_OK);
+  ends_run(s, c, 300);
+  CHECK_NEAR(limit_of(s), 300.0, 1e-9);
+  CHECK(c->session->ferry.limits.force == 900.0);
+  CHECK(hap_pointer_remove(c->session, c->hand) == HAP_OK);
+  CHECK(c->session->ferry.limits.force == 0.0);
+}
+
 /* ---- honest ones: heavy bodies that fall, jump, are driven and edited near a hand ---- */
 
 static bool bouncy_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
@@ -365,6 +409,42 @@ TEST(what_driven_bodies_hit_is_within_the_bound)
       dBodySetLinearVel(ball, -3.0, 0.0, 0.0);
     }
   }
+  honest_check(s);
+}
+
+static bool belt_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
+{
+  (void)user;
+  (void)a;
+  (void)b;
+  *io = (dSurfaceParameters){.mode = dContactApprox1 | dContactMotion1, .mu = 0.8, .motion1 = 3.0};
+  return true;
+}
+
+/* A floor that moves with 3 m/s, as a conveyor, takes bodies of 20 kg along. The hand, of 2 N and
+ * 1 m/s at most, gives next to nothing. */
+TEST(what_a_conveyor_takes_along_is_within_the_bound)
+{
+  server *s = server_open_with(belt_surface);
+  s->far.world.guests[0].bound.most = (hapi_limits){2.0, 1.0};
+  client *c = client_open(s, "hand", 1000.0, 8);
+  dBodyID boxes[3];
+  for (int i = 0; i < 3; ++i) {
+    boxes[i] = ode_box(s->world, s->space, 20.0, AT(0.1, 0.1, 0.1), AT(0.2 * i, 0.3, 0.05));
+  }
+  double fastest = 0.0;
+  client_put(c, 0.0, 0.2, 0.0);
+  for (int i = 0; i < 6000; ++i) {
+    ends_run(s, c, 1);
+    const dReal *v = dBodyGetLinearVel(boxes[i % 3]);
+    fastest = fmax(fastest, hypot(v[0], v[1]));
+    if (i % 1000 == 999) { /* back to the hand, at rest */
+      dBodySetPosition(boxes[i / 1000 % 3], 0.1, -0.3, 0.3);
+      dBodySetLinearVel(boxes[i / 1000 % 3], 0.0, 0.0, 0.0);
+    }
+  }
+  printf("# %.2f m/s\n", fastest);
+  CHECK(fastest > 2.0);
   honest_check(s);
 }
 

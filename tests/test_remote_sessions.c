@@ -13,6 +13,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "tests/logged.h"
 #include "tests/ode_world.h"
 
 #define MS 1000000LL
@@ -461,4 +462,341 @@ TEST(limits_of_a_client_are_counted_and_told_by_the_public_api)
   CHECK(state.bounded > 0);
   CHECK(state.turned_away == 0 || side_state(hand).turned_away == 1);
   CHECK(fabs(dBodyGetLinearVel(world->cube)[0]) < 0.2);
+}
+
+/* ---- drawn poses ---- */
+
+#define ROLL 0.3 /* m/s */
+
+/* A ball that nobody touches, far from the hand, without friction. */
+static dBodyID side_add_ball(const side *s)
+{
+  dBodyID ball = dBodyCreate(s->world);
+  dGeomID geom = dCreateSphere(s->space, 0.05);
+  dMass mass;
+  dMassSetSphereTotal(&mass, 0.3, 0.05);
+  dBodySetMass(ball, &mass);
+  dGeomSetBody(geom, ball);
+  dBodySetPosition(ball, 0.0, 8.0, 1.0);
+  dBodySetGravityMode(ball, 0);
+  return ball;
+}
+
+/* path: of both directions; NULL: without delay. */
+static void side_join(side *world, side *hand, const hap_link_path_def *path)
+{
+  REQUIRE(hap_link_local_serve(&world->link, NULL) == HAP_OK);
+  REQUIRE(hap_link_local_connect(world->link, "", path, path, &hand->link, NULL) == HAP_OK);
+  REQUIRE(hap_session_serve(world->session, world->link) == HAP_OK);
+  REQUIRE(hap_session_connect(hand->session, hand->link) == HAP_OK);
+  session_run(world->session);
+  session_run(hand->session);
+}
+
+static void sides_advance(const side *world, const side *hand, const double to[3], int ticks)
+{
+  const hap_pose pose = {{to[0], to[1], to[2]}, {1.0, 0.0, 0.0, 0.0}};
+  CHECK(hap_pointer_set_target(hand->session, hand->hand, &pose, NULL) == HAP_OK);
+  for (int i = 0; i < ticks; ++i) {
+    CHECK(hap_session_advance(hand->session, 1) == HAP_OK);
+    CHECK(hap_session_advance(world->session, 1) == HAP_OK);
+  }
+}
+
+static double pose_x(const side *s, dBodyID body, int64_t time_ns, hap_body_role *out_role)
+{
+  hap_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  CHECK(hap_session_poses(s->session, time_ns, &body, 1, &pose) >= HAP_OK);
+  CHECK(hap_session_roles(s->session, &body, 1, out_role) == HAP_OK);
+  return pose.position[0];
+}
+
+/* How far the cube, as it is drawn, is from where the force on the hand says that it is. False: the
+ * hand feels nothing. */
+static bool cube_apart(const side *s, double stiffness, double *io_most)
+{
+  hap_pointer_state state;
+  hap_pose cube = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}};
+  CHECK(hap_pointer_get(s->session, s->hand, &state, sizeof state) >= HAP_OK);
+  CHECK(hap_session_poses_now(s->session, &s->cube, 1, &cube) >= HAP_OK);
+  dMatrix3 turn;
+  double away2 = 0.0;
+  double push = 0.0;
+  dRfromQ(turn, cube.quat_wxyz);
+  for (int k = 0; k < 3; ++k) { /* from the cube's surface to the middle of the pointer */
+    double at = 0.0;
+    double force = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      at += turn[4 * i + k] * (state.proxy.position[i] - cube.position[i]);
+      force += turn[4 * i + k] * state.wrench.force[i];
+    }
+    double away = at - fmin(fmax(at, -0.025), 0.025);
+    away2 += away * away;
+    push += away * force;
+  }
+  push /= fmax(sqrt(away2), 1e-9);
+  if (push < 0.2) {
+    return false;
+  }
+  *io_most = fmax(*io_most, fabs(0.01 - sqrt(away2) - push / stiffness));
+  return true;
+}
+
+/* The hand's session has the same world once more, which stands still. Of that it draws what the
+ * other session tells: what the hand pushes at once, and the rest one way, a step and lost
+ * messages late. */
+TEST(bodies_of_the_world_are_drawn_in_the_hand_s_session)
+{
+  side *world = side_new(HAP_DRIVE_LOCKSTEP);
+  side *hand = side_new(HAP_DRIVE_LOCKSTEP);
+  hap_link_path_def path;
+  hap_link_path_def_init(&path, sizeof path);
+  path.delay = 0.05;
+  path.loss = 0.05;
+  side_create(world, true);
+  side_create(hand, true);
+  dBodyID balls[2] = {side_add_ball(world), side_add_ball(hand)};
+  dBodySetLinearVel(balls[0], ROLL, 0.0, 0.0);
+  side_add_hand(hand);
+  side_join(world, hand, &path);
+  double late_most = 0.0;
+  double late_least = 1.0;
+  double apart = 0.0;
+  int touched = 0;
+  for (int i = 0; i < 3000; ++i) {
+    double x = i < 1000 ? -0.06 : fmin(-0.06 + 1e-4 * (i - 1000), 0.04); /* pushes with 0.1 m/s */
+    sides_advance(world, hand, AT(x, 0.0, 0.03), 1);
+    hap_body_role role;
+    int64_t now_ns = hap_session_now(hand->session);
+    if (i > 500) {
+      double late = 1e-9 * (double)now_ns - pose_x(hand, balls[1], now_ns, &role) / ROLL;
+      CHECK(role == HAP_ROLE_WORLD);
+      late_most = fmax(late_most, late);
+      late_least = fmin(late_least, late);
+    }
+    if (cube_apart(hand, 1000.0, &apart)) {
+      ++touched;
+      (void)pose_x(hand, hand->cube, now_ns, &role);
+      CHECK(role == HAP_ROLE_LOOP);
+    }
+  }
+  printf("# the ball is drawn %.0f to %.0f ms late, the cube %.3f mm from the hand in %d ticks\n",
+         1e3 * late_least, 1e3 * late_most, 1e3 * apart, touched);
+  CHECK(late_least > 0.05 && late_most < 0.05 + 5.0 * 0.02);
+  CHECK(touched > 300 && apart < 1e-3);
+  CHECK(dBodyGetPosition(hand->cube)[0] == 0.0 && dBodyGetPosition(balls[1])[0] == 0.0);
+  CHECK(fabs(dBodyGetPosition(world->cube)[0]) > 0.02);
+  CHECK(side_state(hand).refused == 0 && side_state(world).refused == 0);
+  CHECK(side_state(hand).drawn == 1);
+}
+
+/* After the hand has let go, both worlds come to rest at the same place, whatever was lost; a body
+ * that was put elsewhere is drawn there. From then on nothing is told. */
+TEST(what_rests_is_drawn_where_it_is_and_costs_nothing)
+{
+  side *world = side_new(HAP_DRIVE_LOCKSTEP);
+  side *hand = side_new(HAP_DRIVE_LOCKSTEP);
+  hap_link_path_def path;
+  hap_link_path_def_init(&path, sizeof path);
+  path.delay = 0.03;
+  path.jitter = 0.05;
+  path.loss = 0.4;
+  path.duplicate = 0.1;
+  side_create(world, true);
+  side_create(hand, true);
+  dBodyID balls[2] = {side_add_ball(world), side_add_ball(hand)};
+  side_add_hand(hand);
+  side_join(world, hand, &path);
+  sides_advance(world, hand, AT(0.0, -9.0, 3.0), 500);
+  const hap_pose there = {{1.0, 9.0, 2.0}, {0.0, 1.0, 0.0, 0.0}};
+  CHECK(hap_session_lock(world->session) == HAP_OK);
+  CHECK(hap_session_teleport_body(world->session, balls[0], &there) == HAP_OK);
+  dBodySetLinearVel(world->cube, 1.0, 0.5, 0.0);
+  CHECK(hap_session_unlock(world->session) == HAP_OK);
+  sides_advance(world, hand, AT(0.0, -9.0, 3.0), 3000);
+  const dBodyID own[2] = {hand->cube, balls[1]};
+  const dBodyID theirs[2] = {world->cube, balls[0]};
+  hap_pose drawn[2] = {{{0.0}, {0.0}}};
+  CHECK(hap_session_poses(hand->session, hap_session_now(hand->session), own, 2, drawn) >= HAP_OK);
+  for (int i = 0; i < 2; ++i) {
+    const dReal *at = dBodyGetPosition(theirs[i]);
+    const dReal *turn = dBodyGetQuaternion(theirs[i]);
+    double turned = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      turned += turn[k] * drawn[i].quat_wxyz[k];
+    }
+    CHECK(hypot(hypot(drawn[i].position[0] - at[0], drawn[i].position[1] - at[1]),
+                drawn[i].position[2] - at[2]) < 2e-5);
+    CHECK(fabs(turned) > 1.0 - 1e-8);
+  }
+  CHECK(hypot(dBodyGetPosition(world->cube)[0], dBodyGetPosition(world->cube)[1]) > 0.005);
+  CHECK(drawn[1].position[1] == 9.0);
+  uint64_t before = side_state(world).figures.sent_bytes;
+  sides_advance(world, hand, AT(0.0, -9.0, 3.0), 1000);
+  uint64_t after = side_state(world).figures.sent_bytes;
+  printf("# %.0f bytes a step while all rests\n", (double)(after - before) / 50.0);
+  CHECK((double)(after - before) / 50.0 <
+        60.0); /* a frame without a body, and answers for clocks */
+  CHECK(side_state(hand).refused == 0 && side_state(world).failed == 0);
+}
+
+TEST(a_world_that_was_built_otherwise_is_not_drawn_and_a_text_says_so)
+{
+  for (int how = 0; how < 3; ++how) { /* a body more there, another mass, an empty world here */
+    side *world = side_new(HAP_DRIVE_LOCKSTEP);
+    side *hand = side_new(HAP_DRIVE_LOCKSTEP);
+    side_create(world, true);
+    side_create(hand, how < 2);
+    if (how == 0) {
+      (void)side_add_ball(world);
+    } else if (how == 1) {
+      dMass mass;
+      dMassSetBoxTotal(&mass, 0.3, 0.05, 0.05, 0.05);
+      dBodySetMass(hand->cube, &mass);
+    }
+    side_add_hand(hand);
+    log_listen(true);
+    logged[0] = '\0';
+    side_join(world, hand, NULL);
+    dBodySetLinearVel(world->cube, 0.4, 0.0, 0.0);
+    sides_advance(world, hand, AT(0.0, 0.0, 0.5), 500);
+    hap_remote_state state;
+    hap_detail detail;
+    CHECK(hap_session_remote_state(hand->session, &state, sizeof state, &detail) == HAP_OK);
+    CHECK(state.joined == 1 && state.drawn == 0 && state.refused == 0);
+    bool says = strstr(detail.text, "not drawn") != NULL && strstr(logged, "not drawn") != NULL;
+    CHECK(says == (how < 2));
+    CHECK(how != 0 || strstr(logged, "of 2 bodies there and 1 here") != NULL);
+    CHECK(how != 1 || strstr(logged, "1 here with other shapes or masses") != NULL);
+    if (how < 2) {
+      hap_body_role role;
+      CHECK(pose_x(hand, hand->cube, hap_session_now(hand->session), &role) == 0.0);
+    }
+    log_listen(false);
+  }
+}
+
+/* ---- a server that tells what cannot be ---- */
+
+TEST(what_no_body_can_be_is_refused_and_other_bodies_stay_drawn)
+{
+  side *world = side_new(HAP_DRIVE_LOCKSTEP);
+  side *hand = side_new(HAP_DRIVE_LOCKSTEP);
+  side_create(world, true);
+  side_create(hand, true);
+  side_add_hand(hand);
+  side_join(world, hand, NULL);
+  sides_advance(world, hand, AT(0.0, -9.0, 3.0), 500);
+  unsigned char told[HAP_LINK_NEWEST_MOST];
+  const hap_link_address to = {.peer = 1, .channel = 5};
+  memset(told, 0xff, sizeof told);
+  for (uint32_t bytes = 1; bytes < 200; ++bytes) {
+    CHECK(hap_link_send_newest(world->link, hap_session_now(world->session), &to, told, bytes) ==
+          HAP_OK);
+    sides_advance(world, hand, AT(0.0, -9.0, 3.0), 2);
+  }
+  CHECK(side_state(hand).refused == 199);
+  /* Bodies that the hand's session does not have: as of step 2^63, at (1, 1, 1). */
+  static const unsigned char one[28] = {0xee, 0xee, 0xee, 0, 1,    0,    0, 0, 0,    0,
+                                        0x80, 0x3f, 0,    0, 0x80, 0x3f, 0, 0, 0x80, 0x3f,
+                                        0xff, 0x7f, 0,    0, 0,    0,    0, 0};
+  memset(told, 0, 8);
+  told[7] = 0x80;
+  memcpy(told + 8, one, sizeof one);
+  memcpy(told + 36, one, sizeof one);
+  CHECK(hap_link_send_reliably(world->link, hap_session_now(world->session), &to, told, 64) ==
+        HAP_OK);
+  sides_advance(world, hand, AT(0.0, -9.0, 3.0), 100);
+  hap_body_role role;
+  CHECK(side_state(hand).refused == 199);
+  CHECK(fabs(pose_x(hand, hand->cube, hap_session_now(hand->session), &role)) < 1e-3);
+  CHECK(role == HAP_ROLE_WORLD);
+}
+
+/* The application may make and destroy bodies of its own world; the lock is all that it takes. */
+TEST(a_body_that_is_destroyed_in_the_hand_s_session_is_not_looked_at)
+{
+  side *world = side_new(HAP_DRIVE_LOCKSTEP);
+  side *hand = side_new(HAP_DRIVE_LOCKSTEP);
+  side_create(world, true);
+  side_create(hand, true);
+  dBodyID balls[2] = {side_add_ball(world), side_add_ball(hand)};
+  dBodySetLinearVel(balls[0], ROLL, 0.0, 0.0);
+  side_add_hand(hand);
+  side_join(world, hand, NULL);
+  sides_advance(world, hand, AT(0.0, -9.0, 3.0), 500);
+  CHECK(hap_session_lock(hand->session) == HAP_OK);
+  dBodyID late = side_add_ball(hand); /* before: else it would be at the old one's address */
+  dGeomDestroy(dBodyGetFirstGeom(balls[1]));
+  dBodyDestroy(balls[1]);
+  dBodySetPosition(late, 4.0, 8.0, 1.0);
+  CHECK(hap_session_unlock(hand->session) == HAP_OK);
+  sides_advance(world, hand, AT(0.0, -9.0, 3.0), 500);
+  hap_body_role role;
+  CHECK_NEAR(pose_x(hand, late, hap_session_now(hand->session), &role), 4.0, 1e-12);
+  CHECK(pose_x(hand, hand->cube, hap_session_now(hand->session), &role) < 1e-3);
+  CHECK(side_state(hand).refused == 0);
+}
+
+TEST(what_the_world_decides_is_not_set_in_the_hand_s_session)
+{
+  side *world = side_new(HAP_DRIVE_LOCKSTEP);
+  side *hand = side_new(HAP_DRIVE_LOCKSTEP);
+  side_create(world, true);
+  side_create(hand, false);
+  side_add_hand(hand);
+  side_join(world, hand, NULL);
+  CHECK(hap_session_set_model(hand->session, HAP_MODEL_CONTACT) == HAP_ERROR_UNSUPPORTED);
+  CHECK(strstr(side_detail(hand), "another session") != NULL);
+  CHECK(hap_session_set_time_scale(hand->session, 0.5) == HAP_ERROR_UNSUPPORTED);
+  CHECK(hap_session_set_physics_hz(hand->session, 50.0) == HAP_ERROR_UNSUPPORTED);
+  CHECK(hap_session_set_accuracy(hand->session, 0.5) == HAP_ERROR_UNSUPPORTED);
+  CHECK(hap_session_set_effect(hand->session, HAP_EFFECT_FRICTION, HAP_EFFECT_OFF) ==
+        HAP_ERROR_UNSUPPORTED);
+  CHECK(hap_session_set_time_scale(world->session, 0.5) == HAP_OK);
+  CHECK(hap_session_set_model(world->session, HAP_MODEL_SINGLE) == HAP_ERROR_UNSUPPORTED);
+  CHECK(strstr(side_detail(world), "only contact") != NULL);
+}
+
+/* The application draws, and edits its own world, while messages come; the threads share nothing
+ * without a lock (this test is for the sanitizer as well). */
+TEST(in_threads_the_world_is_drawn_while_it_moves)
+{
+  static cable cables[2];
+  side *world = side_new(HAP_DRIVE_THREADS);
+  side *hand = side_new(HAP_DRIVE_THREADS);
+  side_create(world, true);
+  side_create(hand, true);
+  dBodyID balls[2] = {side_add_ball(world), side_add_ball(hand)};
+  side_add_hand(hand);
+  side_put(hand, 3.0);
+  cables_open(cables);
+  REQUIRE(hap_link_create(&cable_ops, &cables[0], &world->link, NULL) == HAP_OK);
+  REQUIRE(hap_link_create(&cable_ops, &cables[1], &hand->link, NULL) == HAP_OK);
+  REQUIRE(hap_session_serve(world->session, world->link) == HAP_OK);
+  REQUIRE(hap_session_connect(hand->session, hand->link) == HAP_OK);
+  REQUIRE(hap_session_start(world->session) >= HAP_OK);
+  REQUIRE(hap_session_start(hand->session) >= HAP_OK);
+  for (int i = 0; i < 5000 && side_state(hand).drawn == 0; ++i) {
+    usleep(1000);
+  }
+  CHECK(side_state(hand).drawn == 1);
+  CHECK(hap_session_lock(world->session) == HAP_OK);
+  dBodySetLinearVel(balls[0], ROLL, 0.0, 0.0);
+  CHECK(hap_session_unlock(world->session) == HAP_OK);
+  double before = 0.0;
+  int back = 0;
+  for (int i = 0; i < 10000 && before < 0.1; ++i) {
+    hap_body_role role;
+    double x = pose_x(hand, balls[1], hap_session_now(hand->session), &role);
+    back += x < before - 1e-9;
+    before = x;
+    if (i % 50 == 0) {
+      CHECK(hap_session_lock(hand->session) == HAP_OK);
+      CHECK(hap_session_unlock(hand->session) == HAP_OK);
+    }
+    usleep(1000);
+  }
+  CHECK(before >= 0.1 && back == 0);
+  CHECK(side_state(hand).refused == 0);
 }

@@ -41,7 +41,8 @@ hap_status run_far_open(const run_options *options, const rig *r, run_far *out, 
              why.text);
     return status;
   }
-  *out = (run_far){.session = r->session, .link = link, .serves = serves};
+  *out =
+      (run_far){.session = r->session, .link = link, .serves = serves, .shown = options->far.shown};
   return HAP_OK;
 }
 
@@ -62,6 +63,11 @@ hap_status run_far_look(run_far *far, hap_detail *detail)
   if (!far->serves && state.turned_away > far->turned_away) {
     *detail = why;
     return HAP_ERROR_STATE;
+  }
+  if (!far->serves && far->shown && joined && state.drawn == 0) {
+    snprintf(detail->text, sizeof detail->text, "--connect: give the server's --scene; %.450s",
+             why.text);
+    return HAP_ERROR_ARGUMENT;
   }
   far->turned_away = state.turned_away;
   return HAP_OK;
@@ -85,6 +91,7 @@ void run_far_print(const run_far *far, FILE *out)
   fprintf(out, "remote_failed: %" PRIu64 "\n", s.failed);
   fprintf(out, "remote_bounded: %" PRIu64 "\n", s.bounded);
   fprintf(out, "remote_turned_away: %" PRIu64 "\n", s.turned_away);
+  fprintf(out, "remote_drawn: %" PRIu64 "\n", s.drawn);
 }
 
 void run_far_close(run_far *far)

@@ -15,11 +15,13 @@ typedef struct run_far {
   bool serves;
   bool joined; /* as it was said last */
   uint64_t turned_away;
+  bool shown; /* bodies are drawn, which need a scene as that of the world */
 } run_far;
 
 /* Before the session is started. On failure *out is zeroed. */
 hap_status run_far_open(const run_options *options, const rig *r, run_far *out, hap_detail *detail);
-/* Says on stderr who comes and goes. HAP_ERROR_STATE: the world does not take this hand. */
+/* Says on stderr who comes and goes. HAP_ERROR_STATE: the world does not take this hand.
+ * HAP_ERROR_ARGUMENT: bodies are to be drawn, and the world is of another scene. */
 hap_status run_far_look(run_far *far, hap_detail *detail);
 /* Lines of the summary. */
 void run_far_print(const run_far *far, FILE *out);

@@ -751,12 +751,8 @@ static hap_status check_far(run_options *o, hap_detail *detail)
                            o->plot_path != NULL || o->black_box_path != NULL)) {
     return options_fail(detail, "--serve: hands and traces are those of --connect");
   }
-  if (o->html_path != NULL || o->shot.path != NULL || o->shot.frames != NULL || o->window.wanted) {
-    return options_fail(detail,
-                        "%s: no pictures yet, so not with --view, --html, --shot or --frames; "
-                        "poses of bodies are not told to the hand's session",
-                        name);
-  }
+  o->far.shown =
+      o->html_path != NULL || o->shot.path != NULL || o->shot.frames != NULL || o->window.wanted;
   if (f->serve != NULL && o->rig.expert.look_ahead == 0.0) {
     o->rig.expert.look_ahead = LOOK_AHEAD_S;
   }

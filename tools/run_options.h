@@ -55,6 +55,7 @@ typedef struct run_far_options {
   const char *peers;
   int32_t domain; /* negative: the default */
   bool insecure;
+  bool shown; /* bodies are drawn */
 } run_far_options;
 
 typedef struct run_options {

@@ -334,6 +334,10 @@ static hap_status wish_do(run_stage *stage, stage_wish wish)
     case STAGE_AGAIN:
     case STAGE_SCENE_NEXT:
     case STAGE_SCENE_BEFORE:
+      if (wish != STAGE_AGAIN && r->options->far.connect != NULL) {
+        notice_set(r, "the scene is that of the world, which another process has");
+        break;
+      }
       stage->goes_on = true;
       stage->scene_step = wish == STAGE_AGAIN ? 0 : wish == STAGE_SCENE_NEXT ? 1 : -1;
       return HAP_END;

@@ -55,7 +55,8 @@ HAP_API void hap_link_dds_def_init(hap_link_dds_def *def, size_t size_of_def);
  * insecure. HAP_ERROR_NOT_FOUND: no module, certificate or interface. HAP_ERROR_UNSUPPORTED: the
  * module is of another version, or DDS has no security. HAP_ERROR_STATE: the process has the DDS
  * domain otherwise. HAP_ERROR_IO: DDS has failed. HAP_ERROR_MEMORY. detail, which may be NULL, says
- * more. */
+ * more. From the first link on, what Cyclone DDS says of itself in this process goes to the log of
+ * hap_hooks and not to stderr. */
 HAP_NODISCARD HAP_API hap_status hap_link_dds_serve(const hap_link_dds_def *def, hap_link **out,
                                                     hap_detail *detail);
 
@@ -77,6 +78,9 @@ typedef struct hap_link_dds_module {
   /* def is checked. serves 1: the server's end. Errors as above. */
   hap_status (*open)(const hap_link_dds_def *def, uint32_t serves, void **out_self,
                      hap_detail *detail);
+  /* Before open: where warnings of DDS go while there are links; error 1: they are errors. Called
+   * by any thread. */
+  void (*listen)(void (*say)(uint32_t error, const char *text));
 } hap_link_dds_module;
 
 HAP_END_DECLS

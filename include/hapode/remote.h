@@ -39,6 +39,14 @@ HAP_NODISCARD HAP_API hap_status hap_session_serve(hap_session *session, hap_lin
  * the session was created over stays as it is, and may be empty. Before start; the link is borrowed
  * likewise, and belongs to a thread of the session. Drives THREADS and LOCKSTEP.
  *
+ * To draw the world, create the session over one that was built as the server's was: the same
+ * bodies and shapes in the same order. hap_session_poses and hap_session_roles then tell of its
+ * bodies what the server's do: those that the loop moves at once, all others one way late. Bodies
+ * that come or go after the start are not told.
+ *
+ * Model, rate, accuracy, effects and time scale are the server's: to set them here is
+ * HAP_ERROR_UNSUPPORTED. Posted edits are run by steps, which this session has none of.
+ *
  * Nothing is felt until the server has answered. Without answers the force fades within 100 ms,
  * once the world is older than two steps and the server's look_ahead. When the server has gone, the
  * session is made anew to join again. Errors as above. */
@@ -79,6 +87,9 @@ typedef struct hap_remote_state {
   /* Hand's session: models with a hand of another session for which it had no room; max_pointers is
    * for those as well */
   uint64_t left_out;
+  /* Hand's session: 1: the bodies of what it was created over are drawn as the server's are. 0: it
+   * is not joined, or its world was built otherwise, and detail says so */
+  uint64_t drawn;
 } hap_remote_state;
 
 /* [any] HAP_ERROR_ARGUMENT: a NULL, or no room for the size. HAP_ERROR_STATE: the session is

@@ -60,6 +60,15 @@ void *hapi_alloc(size_t size)
   return memory;
 }
 
+/* calloc takes large blocks from the system, which gives them zeroed and page by page. */
+void *hapi_alloc_late(size_t count, size_t size)
+{
+  if (current.allocate != default_allocate || count == 0 || size == 0) {
+    return hapi_alloc_array(count, size);
+  }
+  return calloc(count, size);
+}
+
 void *hapi_alloc_array(size_t count, size_t size)
 {
   if (size != 0 && count > SIZE_MAX / size) {

@@ -13,7 +13,10 @@
 
 void *hapi_alloc(size_t size);                     /* zeroed; NULL when there is none */
 void *hapi_alloc_array(size_t count, size_t size); /* zeroed; NULL on overflow as well */
-void hapi_free(void *memory);                      /* NULL allowed */
+/* Likewise, and the heap may bring pages in when they are used first: for much that is seldom used,
+ * and never by the haptic thread. */
+void *hapi_alloc_late(size_t count, size_t size);
+void hapi_free(void *memory); /* NULL allowed */
 /* Grows an array of elements of one size to hold count more than those in use; false: no memory. */
 bool hapi_reserve(void **array, uint32_t *capacity, uint32_t used, uint32_t count, size_t size);
 

@@ -1,6 +1,7 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 #include <dlfcn.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -117,6 +118,25 @@ static bool module_find(char out[PATH_MOST])
   return false;
 }
 
+/* ---- what DDS says of itself ---- */
+
+#define SAID_MOST 20u   /* lines: what DDS warns of it warns of again and again */
+#define SAID_EACH 1000u /* then one of so many */
+
+static void dds_say(uint32_t error, const char *text)
+{
+  static atomic_uint said;
+  unsigned before = atomic_fetch_add(&said, 1);
+  if (before < SAID_MOST) {
+    hapi_log(error != 0 ? HAP_LOG_ERROR : HAP_LOG_WARNING, "DDS: %.400s%s", text,
+             before + 1 < SAID_MOST ? "" : " (what DDS says next is only counted)");
+  } else if (before % SAID_EACH == 0) {
+    hapi_log(HAP_LOG_WARNING, "DDS has said %u things by now; the newest: %.400s", before, text);
+  }
+}
+
+/* ---- opening ---- */
+
 static hap_status module_open(const char *path, const hap_link_dds_module **out, hap_detail *detail)
 {
   char found[PATH_MOST];
@@ -140,6 +160,7 @@ static hap_status module_open(const char *path, const hap_link_dds_module **out,
                      "%.300s is of another version than the library: install both of one",
                      path != NULL ? path : found);
   }
+  (*out)->listen(dds_say);
   return HAP_OK;
 }
 
@@ -157,7 +178,10 @@ static hap_status dds_open(const hap_link_dds_def *given, uint32_t serves, hap_l
   *out = NULL;
   HAPI_TRY(hapi_def_read_optional(&def_type, given, &def, why));
   HAPI_TRY(def_check(&def, why));
-  HAPI_TRY(module_open(def.module, &module, why));
+  hap_status status = module_open(def.module, &module, why);
+  if (status < HAP_OK || module == NULL) {
+    return status;
+  }
   HAPI_TRY(module->open(&def, serves, &self, why));
   return hap_link_create(module->ops, self, out, why);
 }

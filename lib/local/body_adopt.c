@@ -21,9 +21,9 @@ static void twist_advance(double seconds, const double b[6], hap_twist *io)
 
 /* A body that comes in has the world's state, advanced by the age of the model as ticks would have
  * advanced it: each adds b T to the velocity and goes on with that, so the mean velocity of the age
- * is that after (age + T) / 2. */
+ * is that after (age + T) / 2. moves: else it has stayed where it was told to be. */
 static void body_enter(hapi_local_body *body, const hapi_model_body *in, double age_s,
-                       double period)
+                       double period, bool moves)
 {
   bool falls = (in->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_RESTING)) == 0;
   hap_twist mean = in->twist;
@@ -33,7 +33,7 @@ static void body_enter(hapi_local_body *body, const hapi_model_body *in, double 
     twist_advance(0.5 * (age_s + period), in->b, &mean);
     twist_advance(age_s, in->b, &body->twist);
   }
-  hapi_pose_move(&body->pose, &mean, age_s);
+  hapi_pose_move(&body->pose, &mean, moves ? age_s : 0.0);
   memset(body->linear.residual, 0, sizeof body->linear.residual);
   memcpy(body->account.residual_taken, in->residual, sizeof body->account.residual_taken);
 }
@@ -118,7 +118,7 @@ static void take_given(hapi_local_body *body, const hapi_model_body *in)
 /* Model CONTACT: a body that the loop owned before keeps its motion; a new model replaces what is
  * known of it. One that has been let go keeps its pose until physics has had it. */
 static void adopt_contact_body(hapi_local_body *body, const hapi_model_body *in, double age_s,
-                               const hapi_tick_facts *before, uint64_t number)
+                               const hapi_tick_facts *before, const hapi_model *model)
 {
   bool same = body->generation == in->generation && body->epoch == in->epoch;
   bool owned = same && (body->flags & HAPI_BODY_OWNED) != 0;
@@ -130,9 +130,12 @@ static void adopt_contact_body(hapi_local_body *body, const hapi_model_body *in,
       body->twist = in->twist;
     }
   } else if (!owned) {
-    body_enter(body, in, age_s, before->period);
+    /* In a stack the velocity that a step leaves changes from step to step: over a long way of the
+     * message it would tilt the bodies into each other. */
+    bool rocks = (in->flags & HAPI_BODY_STILL) != 0 && age_s > model->period_s;
+    body_enter(body, in, age_s, before->period, !rocks);
     add_new_impulse(body, in);
-    body->entered_model = number;
+    body->entered_model = model->number;
   }
   if ((in->flags & HAPI_BODY_ALONE) != 0) {
     body->entered_model = 0;
@@ -186,7 +189,7 @@ static void adopt_body(hapi_local_body *body, const hapi_model *model, const hap
   bool was_linear = is_linear(before->model, body->flags);
   bool stays_linear = is_linear(model->model, in->flags);
   if (model->model == HAP_MODEL_CONTACT && !stays_linear) {
-    adopt_contact_body(body, in, age_s, before, model->number);
+    adopt_contact_body(body, in, age_s, before, model);
     body->pushed = false;
     return;
   }
@@ -199,7 +202,7 @@ static void adopt_body(hapi_local_body *body, const hapi_model *model, const hap
                ((in->flags & HAPI_BODY_FOLLOWS) == 0 || body->pushed);
   body->epoch = in->epoch;
   if (!keeps) {
-    body_enter(body, in, age_s, before->period);
+    body_enter(body, in, age_s, before->period, true);
     add_new_impulse(body, in);
   }
   bool awake = keeps && (body->flags & HAPI_BODY_RESTING) == 0;

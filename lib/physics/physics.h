@@ -79,6 +79,28 @@ void hapi_physics_set_calls(hapi_physics *physics, const hapi_physics_calls *cal
 /* [control] Before begin: an exchange of the same capacity in place of that of the config. */
 void hapi_physics_set_exchange(hapi_physics *physics, hapi_exchange *exchange);
 
+/* far.c: bodies that are drawn in another session than that of the world. */
+struct hapi_told_body;
+struct hapi_scene_print;
+struct hapi_model;
+/* [physics] Entries of the table of bodies, and where the bodies of count of them are. */
+uint32_t hapi_physics_places(hapi_physics *physics);
+void hapi_physics_tell(hapi_physics *physics, uint32_t first, uint32_t count,
+                       struct hapi_told_body *out);
+/* [control] The caller holds the lock. */
+void hapi_physics_print_scene(hapi_physics *physics, struct hapi_scene_print *out);
+/* [control] In place of begin, in a session whose world is elsewhere: its own bodies are drawn. The
+ * caller holds the lock. */
+hap_status hapi_physics_begin_drawing(hapi_physics *physics, int64_t now_ns);
+/* [any] There, with the lock: bodies that the application has made or destroyed. */
+void hapi_physics_see_drawn(hapi_physics *physics);
+/* [network] There: what the world has told of a step, and a frame for those who draw. times_ns: for
+ * which it holds, and now. period_s: H of the world. */
+void hapi_physics_hear(hapi_physics *physics, uint64_t number, const struct hapi_told_body *bodies,
+                       uint32_t count);
+void hapi_physics_draw(hapi_physics *physics, struct hapi_model *model, double period_s,
+                       const int64_t times_ns[2]);
+
 /* [control] LOCKSTEP: time from a cycle to the use of its model; negative: the model's own. */
 void hapi_physics_set_latency(hapi_physics *physics, double seconds);
 

@@ -154,6 +154,112 @@ void hapi_poses_publish(hapi_drawing *drawing, const hapi_world *world, const ha
   pthread_mutex_unlock(&drawing->lock);
 }
 
+/* ---- of a world that is elsewhere ---- */
+
+void hapi_poses_tell(hapi_drawing *drawing, const hapi_body_table *table, uint32_t first,
+                     uint32_t count, hapi_told_body *out)
+{
+  memset(out, 0, count * sizeof *out);
+  pthread_mutex_lock(&drawing->lock);
+  for (uint32_t i = first; i < first + count && i < table->high; ++i) {
+    const hapi_known_body *known = &table->entries[i];
+    const hapi_drawn *drawn = &drawing->drawn[i];
+    if (known->body != NULL && known->rest->geom == NULL && drawn->first < drawing->frames.count) {
+      out[i - first] =
+          (hapi_told_body){.name = known->rest->name,
+                           .birth = known->rest->birth,
+                           .owned = known->loop_owned,
+                           .pose = *pose_in(drawing, drawn, drawing->frames.count - 1)};
+    }
+  }
+  pthread_mutex_unlock(&drawing->lock);
+}
+
+uint32_t hapi_poses_places(hapi_drawing *drawing, const hapi_body_table *table)
+{
+  pthread_mutex_lock(&drawing->lock);
+  uint32_t high = table->high;
+  pthread_mutex_unlock(&drawing->lock);
+  return high;
+}
+
+void hapi_poses_hear(hapi_drawing *drawing, const hapi_body_table *table, uint64_t number,
+                     const hapi_told_body *bodies, uint32_t count)
+{
+  pthread_mutex_lock(&drawing->lock);
+  for (uint32_t i = 0; i < count; ++i) {
+    uint32_t index = hapi_bodies_find_name(table, bodies[i].name);
+    if (index != HAPI_NONE && drawing->told[index].number < number) {
+      drawing->told[index] = (hapi_drawn_told){number, bodies[i].birth, bodies[i].pose};
+    }
+  }
+  pthread_mutex_unlock(&drawing->lock);
+}
+
+uint32_t hapi_poses_find(const hapi_drawing *drawing, const hapi_body_table *table, uint64_t birth)
+{
+  if (birth > 0 && birth <= table->high && drawing->told[birth - 1].birth == birth &&
+      table->entries[birth - 1].body != NULL) {
+    return (uint32_t)(birth - 1); /* as long as nothing was put elsewhere or destroyed */
+  }
+  for (uint32_t i = 0; i < table->high; ++i) {
+    if (table->entries[i].body != NULL && drawing->told[i].birth == birth) {
+      return i;
+    }
+  }
+  return HAPI_NONE;
+}
+
+static hap_body_role role_in(const hapi_model_body *in)
+{
+  bool rests = (in->flags & HAPI_BODY_RESTING) != 0;
+  return (in->flags & HAPI_BODY_DRIVEN) != 0     ? HAP_ROLE_DRIVEN
+         : (in->flags & HAPI_BODY_OWNED) != 0    ? rests ? HAP_ROLE_RESTING : HAP_ROLE_LOOP
+         : (in->flags & HAPI_BODY_MEASURED) != 0 ? HAP_ROLE_MEASURED
+                                                 : HAP_ROLE_EDGE;
+}
+
+/* What the loop moves itself is in its trail, by slot, and newer there. */
+static void draw_in_model(hapi_drawing *drawing, uint32_t index, uint64_t frame,
+                          const hapi_model_body *in)
+{
+  hapi_drawn *drawn = &drawing->drawn[index];
+  bool owned = (in->flags & HAPI_BODY_OWNED) != 0;
+  *pose_in(drawing, drawn, frame) = drawing->told[index].pose = in->pose;
+  drawn->led |= owned ? 1u << (frame % HAPI_FRAMES) : 0;
+  drawn->role = role_in(in);
+  if (drawn->slots[0] != in->slot || drawn->generations[0] != in->generation) {
+    drawn->slots[1] = drawn->slots[0];
+    drawn->generations[1] = drawn->generations[0];
+    drawn->slots[0] = in->slot;
+    drawn->generations[0] = in->generation;
+  }
+}
+
+void hapi_poses_publish_told(hapi_drawing *drawing, const hapi_body_table *table,
+                             const hapi_cycle *cycle, hapi_model *model, const int64_t times_ns[2])
+{
+  pthread_mutex_lock(&drawing->lock);
+  uint64_t frame = next_frame(&drawing->frames, cycle, times_ns[0], times_ns[1]);
+  for (uint32_t i = 0; i < table->high; ++i) {
+    hapi_drawn *drawn = &drawing->drawn[i];
+    if (table->entries[i].body != NULL) {
+      *pose_in(drawing, drawn, frame) = drawing->told[i].pose;
+      drawn->first = drawn->first > frame ? frame : drawn->first;
+      drawn->led &= ~(1u << (frame % HAPI_FRAMES));
+      drawn->role = HAP_ROLE_WORLD;
+    }
+  }
+  for (uint32_t i = 0; model != NULL && i < model->body_count; ++i) {
+    const hapi_model_body *in = &hapi_model_bodies(model)[i];
+    uint32_t index = in->tag != NULL ? hapi_poses_find(drawing, table, in->birth) : HAPI_NONE;
+    if (index != HAPI_NONE) {
+      draw_in_model(drawing, index, frame, in);
+    }
+  }
+  pthread_mutex_unlock(&drawing->lock);
+}
+
 bool hapi_poses_grow(hapi_drawing *drawing, uint32_t capacity)
 {
   if (capacity <= drawing->capacity) {
@@ -161,14 +267,17 @@ bool hapi_poses_grow(hapi_drawing *drawing, uint32_t capacity)
   }
   hapi_drawn *drawn = hapi_alloc_array(capacity, sizeof *drawn);
   hap_pose *poses = hapi_alloc_array((size_t)capacity * HAPI_FRAMES, sizeof *poses);
-  if (drawn == NULL || poses == NULL) {
+  hapi_drawn_told *told = hapi_alloc_array(capacity, sizeof *told);
+  if (drawn == NULL || poses == NULL || told == NULL) {
     hapi_free(drawn);
     hapi_free(poses);
+    hapi_free(told);
     return false;
   }
   uint32_t old = drawing->capacity;
   if (old > 0) {
     memcpy(drawn, drawing->drawn, old * sizeof *drawn);
+    memcpy(told, drawing->told, old * sizeof *told);
     for (size_t i = 0; i < HAPI_FRAMES; ++i) {
       memcpy(poses + i * capacity, drawing->poses + i * old, old * sizeof *poses);
     }
@@ -176,6 +285,7 @@ bool hapi_poses_grow(hapi_drawing *drawing, uint32_t capacity)
   hapi_poses_finish(drawing);
   drawing->drawn = drawn;
   drawing->poses = poses;
+  drawing->told = told;
   drawing->capacity = capacity;
   return true;
 }
@@ -184,8 +294,10 @@ void hapi_poses_finish(hapi_drawing *drawing)
 {
   hapi_free(drawing->drawn);
   hapi_free(drawing->poses);
+  hapi_free(drawing->told);
   drawing->drawn = NULL;
   drawing->poses = NULL;
+  drawing->told = NULL;
   drawing->capacity = 0;
 }
 
@@ -195,6 +307,13 @@ void hapi_poses_begin(hapi_drawing *drawing, const hapi_known_body *known, uint3
   uint64_t count = drawing->frames.count;
   HAPI_ASSERT(known->slot == HAPI_NONE); /* new: the loop does not lead it */
   memset(drawn, 0, sizeof *drawn);
+  drawing->told[index] = (hapi_drawn_told){
+      .birth = known->rest->name, /* until it is told otherwise */
+      .pose = {.quat_wxyz = {1.0}},
+  };
+  if (hapi_pose_is_sound(known->body)) {
+    hapi_pose_read(known->body, &drawing->told[index].pose);
+  }
   drawn->first = count;
   if (count > 0) {
     add_pose(drawing, known, index, count - 1);

@@ -187,6 +187,7 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, ha
   out->birth = p->world->bodies.entries[slot->known].rest->birth;
   out->tag = dBodyGetWorld(body) == p->world->ode.world ? body : NULL; /* else a carrier */
   out->flags = slot->flags | (slot->pushed ? 0u : (uint32_t)HAPI_BODY_FOLLOWS);
+  out->flags |= hapi_extent_is_still(&p->world->bodies.entries[slot->known]) ? HAPI_BODY_STILL : 0u;
   hapi_pose_read(body, &out->pose);
   hapi_twist_read(body, &out->twist);
   of->course.known &= (slot->flags & HAPI_BODY_DRIVEN) != 0;

@@ -137,7 +137,17 @@ static double power_of_joint(const hapi_model_joint *joint)
   return isfinite(power) ? power : HUGE_VAL;
 }
 
-void hapi_bound_note(hapi_bound *bound, hapi_model *model)
+/* m/s, of the fastest surface that moves under a body, as conveyors do. World's time. */
+static double belt_speed(hapi_near *near, double scale)
+{
+  double fastest = 0.0;
+  for (uint32_t i = 0; near != NULL && i < near->pair_count; ++i) {
+    fastest = hapi_max(fastest, hapi_v3_norm(hapi_near_pairs(near)[i].surface.motion));
+  }
+  return fastest / scale;
+}
+
+void hapi_bound_note(hapi_bound *bound, hapi_model *model, hapi_near *near)
 {
   double scale = model->time_scale;
   double mass = 0.0;
@@ -172,7 +182,11 @@ void hapi_bound_note(hapi_bound *bound, hapi_model *model)
   for (uint32_t i = 0; i < model->joint_count; ++i) {
     bound->power += power_of_joint(&hapi_model_joints(model)[i]);
   }
-  bound->power += bound->rest * driven;
+  double belt = belt_speed(near, scale);
+  bound->power += bound->rest * hapi_max(driven, belt);
+  if (model->period_s > 0.0) { /* friction that takes bodies along: p v with p at most m (u + v) */
+    bound->power += mass * belt * (belt + fastest) / model->period_s;
+  }
   if (model->period_s > 0.0) { /* a wall that moves: p (u + v) with p at most 2 m (u + v) */
     bound->power += HITS * 2.0 * mass * driven * (driven + fastest) / model->period_s;
   }

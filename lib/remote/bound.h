@@ -9,7 +9,7 @@
  * energy of the bodies that a state tells of, kinetic and of height, grows by no more than
  *
  *   the hand's power, force x speed, over the time, saved up for a tenth of a second,
- *   the power of motors, springs and driven bodies, and of the application's forces,
+ *   the power of motors, springs, driven bodies, moving surfaces and the application's forces,
  *   what the bodies have lost in the last second: in a spring, or to the state before.
  *
  * Force x time, saved up for a second, is allowed as well, for what is pushed and does not move:
@@ -62,8 +62,8 @@ void hapi_bound_reset(hapi_bound *bound, int64_t now_ns);
 /* The client has these limits by now; smaller ones than before stay. */
 void hapi_bound_allow(hapi_bound *bound, const hapi_limits *limits);
 
-/* What the client is told. */
-void hapi_bound_note(hapi_bound *bound, hapi_model *model);
+/* What the client is told. near NULL: there is none. */
+void hapi_bound_note(hapi_bound *bound, hapi_model *model, hapi_near *near);
 /* Whether the state may be taken; else *why says what is too much. What it tells of bodies that
  * the client cannot know is taken out. */
 bool hapi_bound_take(hapi_bound *bound, int64_t now_ns, hapi_state *io, hap_detail *why);

@@ -37,7 +37,7 @@ void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of)
       snprintf(why.text, sizeof why.text, "it is of peer %u, who has no part here", event.peer);
       hapi_end_refuse(end, &why);
     } else if (event.kind != HAP_LINK_MESSAGE || event.channel == HAPI_TERMS_CHANNEL ||
-               event.channel == HAPI_STAMPS_CHANNEL) {
+               event.channel == HAPI_STAMPS_CHANNEL || event.channel == HAPI_SCENERY_CHANNEL) {
       hear(of, &event);
     } else if (end->codec.take(end->codec.self, &event, &why) < HAP_OK) {
       hapi_end_refuse(end, &why);
@@ -85,6 +85,15 @@ void hapi_end_send_stamps(hapi_end *end, const unsigned char *data, uint32_t byt
   const hap_link_parcel parcel = {
       .to = {.channel = HAPI_STAMPS_CHANNEL}, .bytes = bytes, .data = data};
   (void)end_post(end, &parcel);
+}
+
+bool hapi_end_send_scenery(void *of, uint32_t part, bool reliable, const void *data, uint32_t bytes)
+{
+  const hap_link_parcel parcel = {.to = {.channel = HAPI_SCENERY_CHANNEL, .part = part},
+                                  .reliable = reliable,
+                                  .bytes = bytes,
+                                  .data = data};
+  return end_post(of, &parcel) >= HAP_OK;
 }
 
 void hapi_end_send_terms(hapi_end *end, const hapi_terms *terms)

@@ -12,6 +12,7 @@
 #include <hapode/link.h>
 
 #include "remote/codec.h"
+#include "remote/scenery.h"
 #include "remote/stamps.h"
 #include "remote/terms.h"
 
@@ -27,7 +28,7 @@ typedef struct hapi_end {
 } hapi_end;
 
 /* What an end makes of an event that is no matter of the codec: the peer has joined or left, or a
- * message of HAPI_TERMS_CHANNEL or HAPI_STAMPS_CHANNEL has come. */
+ * message of a channel of terms.h, stamps.h or scenery.h has come. */
 typedef void (*hapi_end_hear)(void *of, const hap_link_event *event);
 
 /* Takes what has come in: the peer's messages to the codec, other events to hear. The rest waits
@@ -37,6 +38,9 @@ void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of);
 void hapi_end_send(hapi_end *end, void *const messages[2]);
 void hapi_end_send_terms(hapi_end *end, const hapi_terms *terms);
 void hapi_end_send_stamps(hapi_end *end, const unsigned char *data, uint32_t bytes);
+/* hapi_scenery_out.send; of: the end. */
+bool hapi_end_send_scenery(void *of, uint32_t part, bool reliable, const void *data,
+                           uint32_t bytes);
 /* Tells a peer, of whom nothing is taken, why. */
 void hapi_end_send_refusal(hapi_end *end, uint32_t peer, const char *text);
 /* Counts what hear has not understood. */

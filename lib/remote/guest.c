@@ -27,6 +27,7 @@ hap_status hapi_guest_create(hapi_guest *guest, const hapi_exchange *exchange, d
 void hapi_guest_finish(hapi_guest *guest)
 {
   hapi_bound_finish(&guest->bound);
+  hapi_scenery_finish(&guest->scenery);
   hapi_free(guest->state);
   hapi_free(guest->bodies);
   hapi_free(guest->hands);
@@ -40,6 +41,8 @@ void hapi_guest_finish(hapi_guest *guest)
 void hapi_guest_begin(hapi_guest *guest, int64_t now_ns, const hapi_capacity *capacity)
 {
   hapi_bound_reset(&guest->bound, now_ns);
+  hapi_scenery_reset(&guest->scenery);
+  guest->draws = false;
   memset(guest->bodies, 0, capacity->bodies * sizeof *guest->bodies);
   memset(guest->hands, 0, capacity->pointers * sizeof *guest->hands);
   memset(guest->given, 0, capacity->joints * sizeof *guest->given);

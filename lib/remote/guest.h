@@ -31,6 +31,8 @@ typedef struct hapi_guest_hand {
 typedef struct hapi_guest {
   hapi_end end; /* of a client; joined: also of the world's own loop */
   hapi_bound bound;
+  hapi_scenery scenery;
+  bool draws;     /* it wants to hear of all bodies */
   bool admitted;  /* the client has told its terms, and they fit */
   bool fresh;     /* the state has come since the last one was made for physics */
   bool has_state; /* *state is what it told last, as far as it may */

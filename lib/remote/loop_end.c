@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/log.h"
+#include "base/vec.h"
 
 hap_status hapi_loop_end_begin(hapi_loop_end *loop)
 {
@@ -56,6 +57,37 @@ static void state_shift(hapi_loop_end *loop, int64_t offset_ns, hapi_state *io)
 
 /* ---- in ---- */
 
+static void told_hear(hapi_loop_end *loop, const hap_link_event *event)
+{
+  hapi_told_body told[HAPI_SCENERY_MOST];
+  uint64_t number = 0;
+  uint32_t count = hapi_scenery_read(event->data, event->bytes, &number, told);
+  if (count == 0) {
+    const hap_detail why = {"it does not tell where bodies are"};
+    hapi_end_refuse(&loop->end, &why);
+  } else if (loop->draws) {
+    loop->view.hear(loop->view.of, number, told, count);
+  }
+}
+
+/* The bodies of two worlds are told by their names, which only worlds that were built alike have
+ * in common. A session without bodies of its own draws nothing, and says nothing. */
+static void scene_compare(hapi_loop_end *loop, const hapi_scene_print *theirs)
+{
+  const hapi_scene_print *own = &loop->scene;
+  bool same = own->bodies == theirs->bodies && own->shapes == theirs->shapes;
+  loop->draws = same && loop->view.hear != NULL;
+  if (loop->draws || own->bodies == 0 || loop->view.hear == NULL) {
+    return;
+  }
+  snprintf(loop->end.detail.text, sizeof loop->end.detail.text,
+           "bodies are not drawn: the world was built otherwise than this session's own, of %u "
+           "bodies there and %u here%s; build both alike, or make this one empty",
+           theirs->bodies, own->bodies,
+           own->bodies == theirs->bodies ? " with other shapes or masses" : "");
+  hapi_log(HAP_LOG_WARNING, "%.300s", loop->end.detail.text);
+}
+
 static void loop_hear(void *of, const hap_link_event *event)
 {
   hapi_loop_end *loop = of;
@@ -70,6 +102,8 @@ static void loop_hear(void *of, const hap_link_event *event)
       snprintf(why.text, sizeof why.text, "it is no answer about the time");
       hapi_end_refuse(&loop->end, &why);
     }
+  } else if (event->channel == HAPI_SCENERY_CHANNEL) {
+    told_hear(loop, event);
   } else if (hapi_refusal_read(event->data, event->bytes, &why)) {
     hapi_log(HAP_LOG_ERROR, "the world does not take this session: %.300s", why.text);
     loop->turned_away = true;
@@ -81,6 +115,9 @@ static void loop_hear(void *of, const hap_link_event *event)
         hapi_terms_compare(&loop->terms, &terms, &why) < HAP_OK) {
       hapi_end_refuse(&loop->end, &why);
       return;
+    }
+    if (!loop->agreed) {
+      scene_compare(loop, &terms.scene);
     }
     loop->terms = terms;
     loop->agreed = !loop->turned_away;
@@ -123,6 +160,10 @@ void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns)
   model_shift(hapi_stamps_offset(&loop->stamps, &trip_ns), now_ns, model);
   trip_judge(loop, trip_ns);
   hapi_hands_follow(&loop->hands, now_ns, model, near);
+  if (loop->draws) { /* one way late; jitter is not drawn */
+    const int64_t times_ns[2] = {earlier_of(model->state_ns + trip_ns / 2, now_ns), now_ns};
+    loop->view.draw(loop->view.of, model, loop->terms.period_s, times_ns);
+  }
   hapi_exchange_near_publish(loop->exchange);
   hapi_exchange_model_publish(loop->exchange);
 }
@@ -133,11 +174,15 @@ void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns)
 {
   unsigned char question[HAPI_STAMPS_QUESTION];
   loop->end.now_ns = now_ns;
-  if (loop->agreed && !loop->limits_told) {
+  bool grows = loop->limits.force > loop->told.force || loop->limits.speed > loop->told.speed;
+  if (loop->agreed && (grows || !loop->terms_told)) {
     hapi_terms own = loop->terms;
     own.limits = loop->limits;
+    own.draws = loop->draws && loop->scene.bodies > 0;
     hapi_end_send_terms(&loop->end, &own);
-    loop->limits_told = true;
+    loop->told.force = hapi_max(loop->told.force, loop->limits.force);
+    loop->told.speed = hapi_max(loop->told.speed, loop->limits.speed);
+    loop->terms_told = true;
   }
   if (loop->agreed && hapi_stamps_ask(&loop->stamps, now_ns, question)) {
     hapi_end_send_stamps(&loop->end, question, sizeof question);

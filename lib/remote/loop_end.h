@@ -17,21 +17,33 @@ typedef struct hapi_loop_left {
   int64_t told_ns;
 } hapi_loop_left;
 
+/* Who draws; hear NULL: nobody. */
+typedef struct hapi_loop_view {
+  void *of;
+  void (*hear)(void *of, uint64_t number, const hapi_told_body *bodies, uint32_t count);
+  /* With each model. times_ns: for which it is drawn, and now. */
+  void (*draw)(void *of, hapi_model *model, double period_s, const int64_t times_ns[2]);
+} hapi_loop_view;
+
 typedef struct hapi_loop_end {
   hapi_end end;
   hapi_exchange *exchange; /* of the loop */
   bool agreed;             /* terms have come, and are good */
   hapi_terms terms;        /* before: what the loop has */
   hapi_limits limits;      /* of the session's pointers */
-  bool limits_told;        /* to the world */
+  hapi_limits told;        /* to the world: the largest, which it keeps to */
+  bool terms_told;         /* it has heard of this session */
   bool turned_away;        /* by the world, end.detail says why */
   uint64_t number;         /* of the newest model given */
   uint64_t old;            /* models that came behind a newer one */
   int64_t next_ns;         /* when the state is due */
   hapi_stamps stamps;
-  bool said_far;        /* that the world does not look ahead far enough */
-  hapi_loop_left *left; /* by slot of a body */
-  hapi_hands hands;     /* of others; its calls are set before begin */
+  hapi_loop_view view;
+  hapi_scene_print scene; /* of the session's own world */
+  bool draws;             /* the world has the same bodies, and tells where they are */
+  bool said_far;          /* that the world does not look ahead far enough */
+  hapi_loop_left *left;   /* by slot of a body */
+  hapi_hands hands;       /* of others; its calls are set before begin */
 } hapi_loop_end;
 
 /* [control] The exchange is set. HAP_ERROR_MEMORY. */

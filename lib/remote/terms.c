@@ -38,9 +38,11 @@ static const terms_room rooms[] = {
 #define ROOMS (sizeof rooms / sizeof rooms[0])
 #define ROOMS_AT 40 /* byte of the message */
 #define LIMITS_AT 88
+#define DRAWS_AT 104
+#define SCENE_AT 108
 
 static_assert(ROOMS_AT + 4 * ROOMS <= LIMITS_AT, "the rooms are in the message");
-static_assert(LIMITS_AT + 16 <= HAPI_TERMS_BYTES, "so are the limits");
+static_assert(LIMITS_AT + 16 <= DRAWS_AT && SCENE_AT + 12 <= HAPI_TERMS_BYTES, "so is the rest");
 
 /* What a message of channel 0 is. */
 #define KIND_AT 12
@@ -73,6 +75,9 @@ void hapi_terms_write(const hapi_terms *terms, unsigned char out[HAPI_TERMS_BYTE
   }
   hapi_bytes_write_real(terms->limits.force, out + LIMITS_AT);
   hapi_bytes_write_real(terms->limits.speed, out + LIMITS_AT + 8);
+  hapi_bytes_write(terms->draws, 4, out + DRAWS_AT);
+  hapi_bytes_write(terms->scene.bodies, 4, out + SCENE_AT);
+  hapi_bytes_write(terms->scene.shapes, 8, out + SCENE_AT + 4);
 }
 
 uint32_t hapi_refusal_write(const char *text, unsigned char out[HAPI_REFUSAL_BYTES_MOST])
@@ -121,7 +126,10 @@ hap_status hapi_terms_read(const void *data, uint32_t bytes, hapi_terms *out, ha
                       .period_s = hapi_bytes_read_real(in + 24),
                       .haptic_hz = hapi_bytes_read_real(in + 32),
                       .limits = {.force = hapi_bytes_read_real(in + LIMITS_AT),
-                                 .speed = hapi_bytes_read_real(in + LIMITS_AT + 8)}};
+                                 .speed = hapi_bytes_read_real(in + LIMITS_AT + 8)},
+                      .draws = hapi_bytes_read(in + DRAWS_AT, 4) != 0,
+                      .scene = {(uint32_t)hapi_bytes_read(in + SCENE_AT, 4),
+                                hapi_bytes_read(in + SCENE_AT + 4, 8)}};
   for (size_t i = 0; i < ROOMS; ++i) {
     *room_of(&terms.capacity, i) = (uint32_t)hapi_bytes_read(in + ROOMS_AT + 4 * i, 4);
   }

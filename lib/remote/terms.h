@@ -11,9 +11,10 @@
 #include <hapode/status.h>
 
 #include "sync/message.h"
+#include "sync/told_body.h"
 
 #define HAPI_TERMS_CHANNEL 0u
-#define HAPI_TERMS_BYTES 104u
+#define HAPI_TERMS_BYTES 128u
 #define HAPI_TERMS_VERSION 1u /* of these and of all other messages */
 #define HAPI_REFUSAL_BYTES_MOST 272u
 
@@ -28,7 +29,9 @@ typedef struct hapi_terms {
   double period_s;     /* H of physics */
   double haptic_hz;    /* of the loop: joints and damping are converted to its ticks */
   hapi_capacity capacity;
-  hapi_limits limits; /* of a client; of a world those that it allows */
+  hapi_limits limits;     /* of a client; of a world those that it allows */
+  bool draws;             /* a client: it wants to know where all bodies are */
+  hapi_scene_print scene; /* of the session's own world */
 } hapi_terms;
 
 void hapi_terms_write(const hapi_terms *terms, unsigned char out[HAPI_TERMS_BYTES]);

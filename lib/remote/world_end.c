@@ -198,6 +198,7 @@ static void client_admit(hapi_world_end *world, hapi_guest *guest, const hap_lin
     client_turn_away(world, guest, &why);
   } else {
     guest->admitted = true;
+    guest->draws = terms.draws;
     hapi_bound_allow(&guest->bound, &terms.limits);
   }
 }
@@ -504,8 +505,47 @@ static void guest_send(hapi_world_end *world, hapi_guest *guest, hapi_model *mod
   void *const messages[2] = {part, hapi_exchange_near_back(world->cut)};
   part_make(world, guest, model, near);
   copies_tell(world, part);
-  hapi_bound_note(&guest->bound, part);
+  hapi_bound_note(&guest->bound, part, messages[1]);
   hapi_end_send(&guest->end, messages);
+}
+
+/* ---- what is drawn ---- */
+
+/* Bodies as a guest is told of them. */
+typedef struct guest_view {
+  const hapi_world_end *world;
+  uint8_t guest;
+} guest_view;
+
+static uint32_t view_places(void *of)
+{
+  const guest_view *view = of;
+  return view->world->bodies.places(view->world->bodies.of);
+}
+
+/* A loop tells itself of what it moves, and of nothing that another one moves. */
+static void view_read(void *of, uint32_t first, uint32_t count, hapi_told_body *out)
+{
+  const guest_view *view = of;
+  const hapi_shares *shares = &view->world->shares;
+  view->world->bodies.read(view->world->bodies.of, first, count, out);
+  for (uint32_t i = 0; i < count; ++i) {
+    bool moves = false;
+    for (uint32_t k = 0; k < shares->body_count && out[i].owned && !moves; ++k) {
+      moves = shares->of[k].birth == out[i].birth && hapi_shares_moves(shares, view->guest, k);
+    }
+    out[i].owned = moves;
+  }
+}
+
+static void guest_draw(const hapi_world_end *world, hapi_guest *guest)
+{
+  guest_view view = {world, guest_number(world, guest)};
+  const hapi_scenery_source source = {&view, view_places, view_read};
+  const hapi_scenery_out out = {&guest->end, hapi_end_send_scenery};
+  if (guest->draws && world->bodies.read != NULL) {
+    (void)hapi_scenery_step(&guest->scenery, &source, &out); /* without memory: later */
+  }
 }
 
 static void loop_send(hapi_world_end *world, hapi_model *model, hapi_near *near)
@@ -538,6 +578,7 @@ void hapi_world_end_send(hapi_world_end *world, int64_t now_ns)
     guest->end.now_ns = now_ns;
     if (guest->end.joined) {
       guest_send(world, guest, model, near);
+      guest_draw(world, guest);
     }
   }
   if (world->loop != NULL) {

@@ -81,6 +81,15 @@ hap_status hapi_session_may_change(const hap_session *session)
                                  "the session plays a recording, and what happened is in it");
 }
 
+hap_status hapi_session_may_steer(const hap_session *session)
+{
+  HAPI_TRY(hapi_session_may_change(session));
+  return session->ferry.side != HAPI_SIDE_LOOP
+             ? HAP_OK
+             : hapi_session_fail(session, HAP_ERROR_UNSUPPORTED,
+                                 "the world is in another session, which decides this");
+}
+
 /* What the haptic thread uses stays as it is while that thread is somewhere in a device. So do the
  * devices, which the session still has. */
 static void session_leave(const hap_session *session)
@@ -208,6 +217,11 @@ static hap_status session_begin(hap_session *session, hap_detail *detail)
   }
   if (has_world(session)) {
     HAPI_TRY(hapi_physics_begin(session->physics, &start_ns, detail));
+  }
+  if (session->ferry.begin != NULL) {
+    HAPI_TRY(session->ferry.begin(session, start_ns));
+  }
+  if (has_world(session)) {
     ferry_call(session, session->ferry.after_cycle, start_ns);
   }
   /* The first local model, and the first contacts: the first tick has both. */
@@ -523,6 +537,9 @@ hap_status hap_session_unlock(hap_session *session)
   if (session == NULL) {
     return HAP_ERROR_ARGUMENT;
   }
+  if (session->ran && !has_world(session) && hapi_physics_lock_is_mine(session->physics)) {
+    hapi_physics_see_drawn(session->physics); /* there are no steps that would */
+  }
   hap_status status = hapi_physics_unlock(session->physics);
   return status < HAP_OK
              ? hapi_session_fail(session, status, "unlock by a thread that does not have the lock")
@@ -549,9 +566,14 @@ hap_status hap_session_post(hap_session *session, hap_edit_fn edit, void *arg)
 
 hap_status hap_session_set_model(hap_session *session, hap_model model)
 {
-  HAPI_TRY(hapi_session_may_change(session));
+  HAPI_TRY(hapi_session_may_steer(session));
   if ((int)model < 0 || hap_model_name(model) == NULL) {
     return hapi_session_say(session, HAP_ERROR_ARGUMENT, __func__);
+  }
+  if (session->ferry.own != NULL && model != HAP_MODEL_CONTACT) {
+    return hapi_session_fail(session, HAP_ERROR_UNSUPPORTED,
+                             "model %s does not go with a loop far from its world: only contact",
+                             hap_model_name(model));
   }
   hapi_physics_set_model(session->physics, model);
   return HAP_OK;
@@ -559,7 +581,7 @@ hap_status hap_session_set_model(hap_session *session, hap_model model)
 
 hap_status hap_session_set_time_scale(hap_session *session, double scale)
 {
-  HAPI_TRY(hapi_session_may_change(session));
+  HAPI_TRY(hapi_session_may_steer(session));
   if (!(scale == 0.0 || (scale >= TIME_SCALE_LEAST && scale <= 1.0))) { /* NaN too */
     return hapi_session_fail(session, HAP_ERROR_ARGUMENT,
                              "a time scale of %g: 0 for a pause, or %g to 1", scale,
@@ -571,7 +593,7 @@ hap_status hap_session_set_time_scale(hap_session *session, double scale)
 
 hap_status hap_session_set_physics_hz(hap_session *session, double hz)
 {
-  HAPI_TRY(hapi_session_may_change(session));
+  HAPI_TRY(hapi_session_may_steer(session));
   double least = session->def.physics_hz / HAPI_RATE_FALL;
   double most = fmin(session->def.haptic_hz, 1000.0);
   if (!(hz >= least && hz <= most)) { /* NaN too */

@@ -73,7 +73,7 @@ hap_status hap_session_set_accuracy(hap_session *session, double accuracy)
 {
   const hapi_number_rule rule = {"accuracy", accuracy, 0.0, 1.0, NULL, 0.0};
   hap_detail detail = {""};
-  HAPI_TRY(hapi_session_may_change(session));
+  HAPI_TRY(hapi_session_may_steer(session));
   hap_status status = hapi_numbers_check(&rule, 1, &detail);
   if (status >= HAP_OK) {
     hapi_physics_set_accuracy(session->physics, accuracy);
@@ -84,7 +84,7 @@ hap_status hap_session_set_accuracy(hap_session *session, double accuracy)
 hap_status hap_session_set_force_error(hap_session *session, double wanted)
 {
   hap_detail detail = {""};
-  HAPI_TRY(hapi_session_may_change(session));
+  HAPI_TRY(hapi_session_may_steer(session));
   hap_status status = error_check(&session->def, wanted, &detail);
   if (status >= HAP_OK) {
     hapi_physics_set_force_error(session->physics, wanted);
@@ -95,7 +95,7 @@ hap_status hap_session_set_force_error(hap_session *session, double wanted)
 hap_status hap_session_set_budget(hap_session *session, double tick_share, double physics_share)
 {
   hap_detail detail = {""};
-  HAPI_TRY(hapi_session_may_change(session));
+  HAPI_TRY(hapi_session_may_steer(session));
   hap_status status = budget_check(&session->def, tick_share, physics_share, &detail);
   if (status >= HAP_OK) {
     hapi_physics_set_budget(session->physics, tick_share, physics_share);

@@ -174,7 +174,7 @@ void hapi_session_unpack_effects(uint32_t packed, hap_expert_def *io)
 hap_status hap_session_set_effect(hap_session *session, hap_effect effect, hap_effect_wish wish)
 {
   hap_detail detail = {""};
-  HAPI_TRY(hapi_session_may_change(session));
+  HAPI_TRY(hapi_session_may_steer(session));
   hap_status status =
       wish_check(&session->def, effect, wish, hapi_physics_wanted_model(session->physics), &detail);
   if (status >= HAP_OK && effect == HAP_EFFECT_RECORDING && wish == HAP_EFFECT_OFF &&

@@ -123,6 +123,39 @@ static void network_stop(hap_session *session)
   hapi_thread_join(&session->ferry.far->thread);
 }
 
+/* ---- who draws ---- */
+
+static uint32_t far_places(void *of)
+{
+  return hapi_physics_places(of);
+}
+
+static void far_tell(void *of, uint32_t first, uint32_t count, hapi_told_body *out)
+{
+  hapi_physics_tell(of, first, count, out);
+}
+
+static void far_hear(void *of, uint64_t number, const hapi_told_body *bodies, uint32_t count)
+{
+  hapi_physics_hear(of, number, bodies, count);
+}
+
+static void far_draw(void *of, hapi_model *model, double period_s, const int64_t times_ns[2])
+{
+  hapi_physics_draw(of, model, period_s, times_ns);
+}
+
+static hap_status far_begin(hap_session *session, int64_t start_ns)
+{
+  hapi_far *far = session->ferry.far;
+  if (session->ferry.side == HAPI_SIDE_LOOP) {
+    HAPI_TRY(hapi_physics_begin_drawing(session->physics, start_ns));
+  }
+  hapi_physics_print_scene(session->physics, &far->loop.scene);
+  far->world.terms.scene = far->loop.scene;
+  return HAP_OK;
+}
+
 /* ---- hands of others: pointers without a device ---- */
 
 /* What a message says is what a pointer may be, or the hand is left out. */
@@ -181,6 +214,10 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
   far->world.terms.limits = (hapi_limits){HAP_CLIENT_FORCE, HAP_CLIENT_SPEED};
   far->loop.limits = session->ferry.limits;
   far->world.exchange = apart != NULL ? apart : session->exchange;
+  far->world.bodies = (hapi_scenery_source){session->physics, far_places, far_tell};
+  if (session->ferry.side == HAPI_SIDE_LOOP) {
+    far->loop.view = (hapi_loop_view){session->physics, far_hear, far_draw};
+  }
   far->loop.exchange = session->exchange;
   far->lockstep = def->drive == HAP_DRIVE_LOCKSTEP;
   pthread_mutex_init(&far->lock, NULL);
@@ -203,6 +240,7 @@ hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *
     ferry.before_tick = far_before_tick;
     ferry.after_tick = far_after_tick;
   }
+  ferry.begin = side != HAPI_SIDE_BOTH ? far_begin : NULL;
   if (side == HAPI_SIDE_LOOP) {
     ferry.start = network_start;
     ferry.stop = network_stop;

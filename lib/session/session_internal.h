@@ -52,6 +52,8 @@ typedef struct hapi_ferry {
   struct hapi_far *far; /* the ends that are the ferry; NULL: something else is */
   hapi_limits limits;   /* of all pointers, for a world far away; also without a ferry */
   hapi_remote *own;     /* what serve or connect have made; else NULL */
+  /* When the session begins, after its world. The caller holds the lock. NULL: nothing is due. */
+  hap_status (*begin)(hap_session *session, int64_t start_ns);
   /* A thread of its own, in drives with threads; stop is idempotent. NULL: it needs none. */
   hap_status (*start)(hap_session *session);
   void (*stop)(hap_session *session);
@@ -116,6 +118,8 @@ hap_status hapi_session_find_body(hap_session *session, void *body, uint64_t *ou
 hap_status hapi_session_say(const hap_session *session, hap_status status, const char *call);
 /* HAP_ERROR_ARGUMENT: NULL. HAP_ERROR_STATE: it plays a recording, and what happened is in it. */
 hap_status hapi_session_may_change(const hap_session *session);
+/* Likewise, and HAP_ERROR_UNSUPPORTED: it has no world that it could be said to. */
+hap_status hapi_session_may_steer(const hap_session *session);
 /* What create has made; stopped before. */
 void hapi_session_free(hap_session *session);
 
@@ -141,6 +145,11 @@ typedef struct hapi_far {
  * Errors as above, and HAP_ERROR_MEMORY. */
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
 void hapi_far_finish(hapi_far *far); /* begun before */
+/* session_pointer.c: what a pointer can do to a world. */
+hapi_limits hapi_session_limits_of(const hapi_pointer_setup *setup);
+/* [any] The pointers together can do so much more, in force that may be less than 0; a world far
+ * away is told. */
+void hapi_session_allow(hap_session *session, const hapi_limits *more);
 
 /* session_record.c; begin does nothing where there is no recorder, stop where there is no player
  * either */

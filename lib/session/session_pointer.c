@@ -107,16 +107,26 @@ hap_status hapi_session_check_coupling(const hap_session *session, const hapi_po
 #define REACH_M 0.1 /* a hand presses a pointer no farther into what does not give way */
 
 /* A body gets what the pointer's spring gives, also where the device gives less to the hand. */
-static void hand_allow(hap_session *session, const hapi_pointer_setup *setup)
+hapi_limits hapi_session_limits_of(const hapi_pointer_setup *setup)
 {
   double felt = setup->force_scale > 0.0 ? setup->max_force / setup->force_scale : 0.0;
+  return (hapi_limits){.force = hapi_max(felt, REACH_M * setup->stiffness),
+                       .speed = HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale};
+}
+
+void hapi_session_allow(hap_session *session, const hapi_limits *more)
+{
   hapi_far *far = session->ferry.far;
-  session->ferry.limits.force += hapi_max(felt, REACH_M * setup->stiffness);
-  session->ferry.limits.speed =
-      hapi_max(session->ferry.limits.speed, HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale);
+  pthread_mutex_lock(&session->detail_lock); /* it is for one short text, and short enough */
+  hapi_limits *sum = &session->ferry.limits;
+  sum->force = hapi_max(sum->force + more->force, 0.0);
+  sum->speed = hapi_max(sum->speed, more->speed);
+  const hapi_limits now = *sum;
+  pthread_mutex_unlock(&session->detail_lock);
   if (far != NULL) {
-    far->loop.limits = session->ferry.limits;
-    far->loop.limits_told = false;
+    pthread_mutex_lock(&far->lock);
+    far->loop.limits = now;
+    pthread_mutex_unlock(&far->lock);
   }
 }
 
@@ -129,11 +139,12 @@ static hap_status hand_add(hap_session *session, const hapi_pointer_setup *setup
     pthread_mutex_lock(&far->lock);
   }
   hap_status status = hapi_haptic_add_pointer(session->haptic, setup, out, detail);
-  if (status >= HAP_OK) {
-    hand_allow(session, setup);
-  }
   if (far != NULL) {
     pthread_mutex_unlock(&far->lock);
+  }
+  if (status >= HAP_OK) {
+    const hapi_limits limits = hapi_session_limits_of(setup);
+    hapi_session_allow(session, &limits);
   }
   return status;
 }
@@ -182,9 +193,15 @@ hap_status hapi_session_say_why_not(const hap_session *session, hap_pointer_id p
 
 hap_status hap_pointer_remove(hap_session *session, hap_pointer_id pointer)
 {
+  hapi_pointer_setting setting;
   HAPI_TRY(hapi_session_may_change(session));
-  return hapi_session_say_why_not(session, pointer,
-                                  hapi_haptic_remove_pointer(session->haptic, pointer));
+  bool known = hapi_haptic_get_settings(session->haptic, pointer, &setting) >= HAP_OK;
+  hap_status status = hapi_haptic_remove_pointer(session->haptic, pointer);
+  if (status >= HAP_OK && known) {
+    const hapi_limits less = {.force = -hapi_session_limits_of(&setting.def).force};
+    hapi_session_allow(session, &less);
+  }
+  return hapi_session_say_why_not(session, pointer, status);
 }
 
 hap_status hap_pointer_restart(hap_session *session, hap_pointer_id pointer)

@@ -47,6 +47,7 @@ hap_status hapi_session_check_setting(const hapi_pointer_setting *setting, hap_d
 typedef struct settings_given {
   const hap_session *session;
   const hap_pointer_settings *settings;
+  hapi_limits *more; /* what the pointer can do to a world by them, beyond what it could */
 } settings_given;
 
 static hap_status settings_merge(const void *of, hapi_pointer_setting *io, hapi_tool_hull *io_hull,
@@ -71,6 +72,7 @@ static hap_status settings_merge(const void *of, hapi_pointer_setting *io, hapi_
       .coupling_stiffness = s->coupling_stiffness,
       .coupling_damping = s->coupling_damping,
   };
+  const hapi_limits before = hapi_session_limits_of(&io->def);
   io->mask = s->mask;
   hapi_settings_copy(s->mask, &given, &io->def);
   if ((s->mask & HAP_SET_BASE) != 0) {
@@ -87,6 +89,8 @@ static hap_status settings_merge(const void *of, hapi_pointer_setting *io, hapi_
       memcpy(io_hull->points, s->hull_xyz, 3 * s->hull_points * sizeof(double));
     }
   }
+  *from->more = hapi_session_limits_of(&io->def);
+  from->more->force -= before.force;
   io->def.hull_xyz = NULL;
   hapi_quat_normalize(io->def.pose_world_device.quat_wxyz);
   return HAP_OK;
@@ -111,8 +115,13 @@ hap_status hap_pointer_set(hap_session *session, hap_pointer_id pointer,
   if (status < HAP_OK) {
     return hapi_session_note(session, status, &detail);
   }
-  const settings_given given = {session, &known};
-  return setting_give(session, pointer, settings_merge, &given);
+  hapi_limits more = {0.0, 0.0};
+  const settings_given given = {session, &known, &more};
+  status = setting_give(session, pointer, settings_merge, &given);
+  if (status >= HAP_OK) {
+    hapi_session_allow(session, &more);
+  }
+  return status;
 }
 
 hap_status hap_pointer_settings_get(const hap_session *session, hap_pointer_id pointer,

@@ -30,7 +30,7 @@ bool hapi_wire_frame_create(hapi_wire_frame *frame, const hapi_wire_shape *shape
     size += (size_t)shape->most[i] * (shape->cells[i] * sizeof(uint64_t) + sizeof(uint64_t)) +
             (size_t)(shape->labels[i] + 1) / 2 * sizeof(uint64_t);
   }
-  uint64_t *at = hapi_alloc(size);
+  uint64_t *at = hapi_alloc_late(1, size);
   frame->memory = at;
   for (uint32_t i = shape->first; at != NULL && i < shape->end; ++i) {
     frame->cells[i] = at;

@@ -23,7 +23,7 @@ bool hapi_wire_receiver_create(hapi_wire_receiver *receiver, uint32_t channel, u
     receiver->records_most += shape->most[i];
     receiver->directory_size += 2 * HAPI_CODE_MOST * ((size_t)shape->most[i] + 1);
     if (hapi_wire_records[i].known) {
-      receiver->known[i] = hapi_alloc_array(shape->labels[i], shape->cells[i] * sizeof(uint64_t));
+      receiver->known[i] = hapi_alloc_late(shape->labels[i], shape->cells[i] * sizeof(uint64_t));
       receiver->serials[i] = hapi_alloc_array(shape->labels[i], sizeof(uint64_t));
       good = good && receiver->known[i] != NULL && receiver->serials[i] != NULL;
     }
@@ -31,9 +31,9 @@ bool hapi_wire_receiver_create(hapi_wire_receiver *receiver, uint32_t channel, u
   for (uint32_t i = 0; i < FRAMES; ++i) {
     good = good && hapi_wire_frame_create(&receiver->frames[i], shape);
   }
-  receiver->gatherings = hapi_alloc_array(HAPI_WIRE_GATHERINGS, sizeof *receiver->gatherings);
+  receiver->gatherings = hapi_alloc_late(HAPI_WIRE_GATHERINGS, sizeof *receiver->gatherings);
   receiver->directory = hapi_alloc(receiver->directory_size);
-  receiver->lost = hapi_alloc_array(receiver->records_most, sizeof *receiver->lost);
+  receiver->lost = hapi_alloc_late(receiver->records_most, sizeof *receiver->lost);
   return good && receiver->gatherings != NULL && receiver->directory != NULL &&
          receiver->lost != NULL;
 }

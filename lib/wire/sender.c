@@ -25,7 +25,7 @@ bool hapi_wire_sender_create(hapi_wire_sender *sender, uint32_t channel, uint32_
     good = good && hapi_wire_labels_create(&sender->labels[i], shape->labels[i]);
     most += HAPI_CODE_MOST * ((size_t)shape->most[i] + 1);
     if (hapi_wire_records[i].known && shape->most[i] > 0) {
-      sender->known[i] = hapi_alloc_array(shape->labels[i], shape->cells[i] * sizeof(uint64_t));
+      sender->known[i] = hapi_alloc_late(shape->labels[i], shape->cells[i] * sizeof(uint64_t));
       good = good && sender->known[i] != NULL;
     }
   }

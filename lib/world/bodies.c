@@ -29,6 +29,19 @@ uint32_t hapi_bodies_find_birth(const hapi_body_table *table, uint64_t birth)
   return HAPI_NONE;
 }
 
+uint32_t hapi_bodies_find_name(const hapi_body_table *table, uint64_t name)
+{
+  if (name > 0 && name <= table->high && table->rests[name - 1].name == name) {
+    return (uint32_t)(name - 1); /* where it is, as long as no body was destroyed */
+  }
+  for (uint32_t i = 0; i < table->high; ++i) {
+    if (table->entries[i].body != NULL && table->rests[i].name == name) {
+      return i;
+    }
+  }
+  return HAPI_NONE;
+}
+
 static hap_status table_grow(hapi_body_table *table, uint32_t capacity)
 {
   const hapi_world_listener *listener = table->listener;
@@ -100,7 +113,7 @@ static void begin_entry(hapi_body_table *table, hapi_known_body *known, dBodyID 
   HAPI_ASSERT(body != NULL && rest == &table->rests[known - table->entries]);
   memset(rest, 0, sizeof *rest);
   *known = (hapi_known_body){.body = body, .rest = rest};
-  rest->birth = ++table->births;
+  rest->birth = rest->name = ++table->births;
   known->slot = HAPI_NONE;
 }
 
@@ -170,6 +183,7 @@ uint32_t hapi_bodies_renew(hapi_body_table *table, dBodyID body)
   known->found = before.found;
   known->seen = before.seen;
   known->next = before.next;
+  known->rest->name = rest.name;
   known->rest->adopted = rest.adopted;
   known->rest->moved_callback = rest.moved_callback;
   table->listener->body_begun(table->listener->physics, index);

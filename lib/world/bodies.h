@@ -50,6 +50,7 @@ typedef struct hapi_posed_way {
 /* What a step does not read for a body that is far from the pointers and has not changed. */
 typedef struct hapi_known_rest {
   uint64_t birth; /* number of this life of the entry, from 1: addresses come again */
+  uint64_t name;  /* its first birth: stays where it is renewed */
   bool adopted;
   double user_force[3]; /* accumulators before the last global step */
   double user_torque[3];
@@ -139,6 +140,8 @@ void hapi_bodies_finish(hapi_body_table *table);
 uint32_t hapi_bodies_find(const hapi_body_table *table, dBodyID body); /* HAPI_NONE */
 /* By the birth of its entry; HAPI_NONE: it is gone. */
 uint32_t hapi_bodies_find_birth(const hapi_body_table *table, uint64_t birth);
+/* Likewise, by its name. */
+uint32_t hapi_bodies_find_name(const hapi_body_table *table, uint64_t name);
 /* Reads which bodies there are; HAP_ERROR_MEMORY when the table cannot grow. syncs: once in a
  * cycle, when what the application has moved counts. */
 hap_status hapi_bodies_scan(hapi_world *world, const hapi_cycle *cycle, bool syncs);
@@ -155,6 +158,7 @@ hap_status hapi_bodies_set_moved_callback(hapi_world *world, const hapi_cycle *c
 bool hapi_extent_follow(hapi_known_body *known); /* measures it when the geoms have changed: true */
 /* m/s, of its surface; 0 for one that sleeps */
 double hapi_extent_speed(const hapi_known_body *known);
+bool hapi_extent_is_still(const hapi_known_body *known); /* now, and for some cycles before */
 /* At a sync, after a step of that length: how a body that is moved by its pose goes. */
 void hapi_extent_follow_way(hapi_known_body *known, double seconds);
 /* ODE's twist, or that of its poses. */

@@ -10,6 +10,7 @@
  * around a geom, which it is taken from, is another one in each orientation. */
 
 #define REST_SPEED 2e-3 /* m/s */
+#define STILL_LEAST 4u  /* cycles */
 
 /* Of a carrier the geom that it is of. */
 static dGeomID first_geom(const hapi_known_body *known)
@@ -111,6 +112,11 @@ void hapi_extent_rest(hapi_known_body *known, double speed)
 {
   bool rests = speed < REST_SPEED && !known->pushed;
   known->still = !rests ? 0 : known->still < HAPI_STILL_MOST ? known->still + 1 : known->still;
+}
+
+bool hapi_extent_is_still(const hapi_known_body *known)
+{
+  return known->still >= STILL_LEAST && !known->pushed && hapi_extent_speed(known) < REST_SPEED;
 }
 
 double hapi_extent_speed(const hapi_known_body *known)

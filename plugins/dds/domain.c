@@ -94,6 +94,33 @@ typedef struct open_domain {
 static pthread_mutex_t domains_lock = PTHREAD_MUTEX_INITIALIZER;
 static open_domain domains[DOMAINS_MOST];
 
+/* ---- what DDS says of itself, of all domains of the process ---- */
+
+static void (*domains_say)(uint32_t error, const char *text);
+
+static void log_take(void *of, const dds_log_data_t *data)
+{
+  char text[512];
+  (void)of;
+  (void)snprintf(text, sizeof text, "%.*s", (int)strcspn(data->message, "\n"), data->message);
+  if (domains_say != NULL &&
+      (data->priority & (DDS_LC_FATAL | DDS_LC_ERROR | DDS_LC_WARNING)) != 0) {
+    domains_say((data->priority & DDS_LC_WARNING) == 0, text);
+  }
+}
+
+void link_domain_listen(void (*say)(uint32_t error, const char *text))
+{
+  pthread_mutex_lock(&domains_lock);
+  if (say != domains_say) { /* once: threads of DDS read it without the lock */
+    domains_say = say;
+    dds_set_log_sink(say != NULL ? log_take : NULL, NULL);
+  }
+  pthread_mutex_unlock(&domains_lock);
+}
+
+/* ---- domains ---- */
+
 /* That of the id, or a free one; NULL: neither. */
 static open_domain *domain_at(uint32_t id)
 {

@@ -14,6 +14,8 @@
  * yet. Errors as of hap_link_dds_serve. */
 hap_status link_domain_join(const hap_link_dds_def *def, dds_entity_t *out_participant,
                             hap_detail *detail);
+/* Whom DDS tells its warnings while there are domains; NULL: stderr. */
+void link_domain_listen(void (*say)(uint32_t error, const char *text));
 /* Ends the participant, and the domain with the last one. */
 void link_domain_leave(uint32_t domain, dds_entity_t participant);
 

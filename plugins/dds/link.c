@@ -600,8 +600,11 @@ static const hap_link_ops ops = {.abi = HAP_LINK_ABI,
                                  .poll = link_poll,
                                  .close = link_close};
 
-static const hap_link_dds_module module = {
-    .abi = HAP_LINK_DDS_ABI, .size = sizeof module, .ops = &ops, .open = link_open};
+static const hap_link_dds_module module = {.abi = HAP_LINK_DDS_ABI,
+                                           .size = sizeof module,
+                                           .ops = &ops,
+                                           .open = link_open,
+                                           .listen = link_domain_listen};
 
 HAP_API const hap_link_dds_module *hapode_link_dds_module(void);
 HAP_API const hap_link_dds_module *hapode_link_dds_module(void)
