@@ -26,7 +26,8 @@ HAP_BEGIN_DECLS
  *
  * When a hand's session leaves, its bodies are the world's again. One that finds no room is told
  * so. Bodies that hands of several sessions may touch are moved by a loop of this session, which
- * drives THREADS and FRAME run in a haptic and a contact thread; with max_pointers 1 there is none.
+ * drives THREADS and FRAME run in a haptic and a contact thread, from the second session on that
+ * joins; with max_pointers 1 there is none.
  * A session that is served or connected is started once. What a hand's session does to bodies is
  * bounded by hap_session_set_client_limits.
  *

@@ -186,6 +186,10 @@ static void client_join(hapi_world_end *world, uint32_t peer)
   guest->end.codec.reset(guest->end.codec.self);
   ++world->joined;
   ++world->clients;
+  if (world->joined > 1 && world->wake != NULL) {
+    world->wake(world->wake_of);
+    world->wake = NULL;
+  }
   hapi_end_send_terms(&guest->end, &world->terms);
 }
 
@@ -489,23 +493,23 @@ static void copies_tell(const hapi_world_end *world, hapi_model *io)
   }
 }
 
-/* The guest's part of the model, in world->cut. */
-static void part_make(hapi_world_end *world, hapi_guest *guest, hapi_model *model, hapi_near *near)
+/* The guest's part of the model. */
+static void part_make(const hapi_world_end *world, hapi_guest *guest, hapi_model *model,
+                      hapi_near *near, void *const out[2])
 {
-  hapi_model *part = hapi_exchange_model_back(world->cut);
-  hapi_shares_cut(&world->shares, guest_number(world, guest), model, near, part,
-                  hapi_exchange_near_back(world->cut));
-  bodies_give(world, guest, part);
-  bodies_tell(guest, part);
+  hapi_shares_cut(&world->shares, guest_number(world, guest), model, near, out[0], out[1]);
+  bodies_give(world, guest, out[0]);
+  bodies_tell(guest, out[0]);
 }
 
-static void guest_send(hapi_world_end *world, hapi_guest *guest, hapi_model *model, hapi_near *near)
+static void guest_send(const hapi_world_end *world, hapi_guest *guest, hapi_model *model,
+                       hapi_near *near)
 {
-  hapi_model *part = hapi_exchange_model_back(world->cut);
-  void *const messages[2] = {part, hapi_exchange_near_back(world->cut)};
-  part_make(world, guest, model, near);
-  copies_tell(world, part);
-  hapi_bound_note(&guest->bound, part, messages[1]);
+  void *const messages[2] = {hapi_exchange_model_back(world->cut),
+                             hapi_exchange_near_back(world->cut)};
+  part_make(world, guest, model, near, messages);
+  copies_tell(world, messages[0]);
+  hapi_bound_note(&guest->bound, messages[0], messages[1]);
   hapi_end_send(&guest->end, messages);
 }
 
@@ -550,14 +554,10 @@ static void guest_draw(const hapi_world_end *world, hapi_guest *guest)
 
 static void loop_send(hapi_world_end *world, hapi_model *model, hapi_near *near)
 {
-  hapi_model *part = hapi_exchange_model_back(world->loop);
-  hapi_near *near_part = hapi_exchange_near_back(world->loop);
-  part_make(world, &world->guests[world->shares.loop], model, near);
-  memcpy(part, hapi_exchange_model_back(world->cut),
-         hapi_exchange_message_size(world->loop, HAPI_CHANNEL_MODEL));
-  memcpy(near_part, hapi_exchange_near_back(world->cut),
-         hapi_exchange_message_size(world->loop, HAPI_CHANNEL_NEAR));
-  hapi_hands_follow(&world->hands, world->end.now_ns, part, near_part);
+  void *const messages[2] = {hapi_exchange_model_back(world->loop),
+                             hapi_exchange_near_back(world->loop)};
+  part_make(world, &world->guests[world->shares.loop], model, near, messages);
+  hapi_hands_follow(&world->hands, world->end.now_ns, messages[0], messages[1]);
   hapi_exchange_near_publish(world->loop);
   hapi_exchange_model_publish(world->loop);
 }
@@ -581,7 +581,7 @@ void hapi_world_end_send(hapi_world_end *world, int64_t now_ns)
       guest_draw(world, guest);
     }
   }
-  if (world->loop != NULL) {
+  if (world->loop != NULL && world->wake == NULL) {
     loop_send(world, model, near);
   }
   failures_take(world);

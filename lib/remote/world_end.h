@@ -16,7 +16,9 @@ typedef struct hapi_world_end {
   hapi_exchange *exchange; /* of physics */
   hapi_exchange *loop;     /* of the world's own loop, a guest behind the clients; NULL: none */
   hapi_hands hands;        /* in that; its calls are set before begin */
-  hapi_terms terms;        /* for whoever joins */
+  void (*wake)(void *of);  /* of that loop, with the second client; NULL: it runs already */
+  void *wake_of;
+  hapi_terms terms;           /* for whoever joins */
   hapi_scenery_source bodies; /* for clients that draw them; members may be NULL */
   hapi_guest *guests;         /* count of them */
   uint32_t count;             /* room, and the world's own loop */

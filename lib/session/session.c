@@ -170,11 +170,17 @@ static bool has_world(const hap_session *session)
   return session->ferry.side != HAPI_SIDE_LOOP;
 }
 
+/* The loop beside a served world gets its threads with the second hand (session_far.c). */
+static bool has_loop_at_once(const hap_session *session)
+{
+  return session->ferry.side != HAPI_SIDE_WORLD;
+}
+
 /* *out_which: the thread that is to be told of where one does not start. */
 static hap_status threads_run(hap_session *session, const char **out_which)
 {
   *out_which = "haptic";
-  if (has_loop(session)) {
+  if (has_loop_at_once(session)) {
     HAPI_TRY(hapi_haptic_start_thread(session->haptic));
   }
   *out_which = "physics";
@@ -182,7 +188,7 @@ static hap_status threads_run(hap_session *session, const char **out_which)
     HAPI_TRY(hapi_physics_start_thread(session->physics));
   }
   *out_which = "contact";
-  if (has_loop(session)) {
+  if (has_loop_at_once(session)) {
     HAPI_TRY(hapi_contact_start_thread(session->contact));
   }
   *out_which = "network";
@@ -198,7 +204,7 @@ static hap_status start_threads(hap_session *session)
         session, status, "the %s thread could not be started: %s%s", which, strerror(errno),
         errno == EAGAIN ? " (a limit of threads or memory: ulimit -u, -v)" : "");
   }
-  bool wanted = session->def.rt_priority > 0 && has_loop(session);
+  bool wanted = session->def.rt_priority > 0 && has_loop_at_once(session);
   bool given = hapi_haptic_is_realtime(session->haptic) && session->memory_locked;
   return wanted && !given ? HAP_NO_REALTIME : HAP_OK;
 }
@@ -290,6 +296,9 @@ hap_status hap_session_stop(hap_session *session)
   }
   if (!session->started) {
     return HAP_OK;
+  }
+  if (session->ferry.has_loop) {
+    hapi_physics_stop_thread(session->physics); /* which may be starting the loop */
   }
   bool ended = hapi_haptic_end(session->haptic); /* first: the hand is let go */
   hapi_contact_stop_thread(session->contact);

@@ -202,7 +202,17 @@ static void hand_put(void *of, uint64_t id, const hapi_model_hand *hand, int64_t
   (void)hapi_haptic_carry_target(of, (hap_pointer_id){id}, &hand->pose, &hand->twist, times_ns);
 }
 
-static hap_status far_fill(const hap_session *session, hapi_far *far)
+/* Before, there is nothing for the world's own loop to do. */
+static void far_wake(void *of)
+{
+  hap_session *session = of;
+  if (hapi_haptic_start_thread(session->haptic) < HAP_OK ||
+      hapi_contact_start_thread(session->contact) < HAP_OK) {
+    hapi_log(HAP_LOG_ERROR, "no thread for bodies that several hands may touch: they stand still");
+  }
+}
+
+static hap_status far_fill(hap_session *session, hapi_far *far)
 {
   const hap_session_def *def = &session->def;
   hapi_exchange *apart = session->ferry.exchange;
@@ -222,6 +232,8 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
   far->lockstep = def->drive == HAP_DRIVE_LOCKSTEP;
   pthread_mutex_init(&far->lock, NULL);
   far->world.loop = session->ferry.has_loop ? session->exchange : NULL;
+  far->world.wake = def->drive != HAP_DRIVE_LOCKSTEP && session->ferry.has_loop ? far_wake : NULL;
+  far->world.wake_of = session;
   far->world.hands.calls = far->loop.hands.calls =
       (hapi_hands_calls){session->haptic, hand_add, hand_acts, hand_remove, hand_put};
   HAPI_TRY(hapi_world_end_begin(&far->world));
