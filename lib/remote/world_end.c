@@ -235,13 +235,11 @@ static void message_take(hapi_world_end *world, const hap_link_event *event)
   hap_detail why = {""};
   bool known;
   hapi_guest *guest = guest_find(world, event->peer, &known);
-  if (guest == NULL && known) {
-    ++world->end.refused; /* it was told to go: why, stays to be read */
-  } else if (guest == NULL) {
+  if (guest == NULL && !known) {
     snprintf(why.text, sizeof why.text, "it is of peer %u, who has no part here", event->peer);
     hapi_end_refuse(&world->end, &why);
-  } else if (guest->taken++ >= TAKEN_MOST) {
-    ++world->end.refused;
+  } else if (guest == NULL || guest->taken++ >= TAKEN_MOST) {
+    ++world->end.refused; /* told to go, or too much: why, stays to be read */
   } else if (event->channel == HAPI_TERMS_CHANNEL) {
     client_admit(world, guest, event);
   } else if (event->channel == HAPI_STAMPS_CHANNEL) {
