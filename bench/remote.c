@@ -12,11 +12,22 @@
  *   age_ms         of a model in the loop, the largest
  *   beside         force_rel_rms of loop and world in one session
  *   momentum       world / hands
- *   look_ahead_ms  of physics */
+ *   look_ahead_ms  of physics
+ *
+ * And two hands on one cube, each in a session of its own, remote_hands.csv. Columns:
+ *
+ *   task, grip     what the hands do, and how they hold on
+ *   delay_ms       one way
+ *   error          RMS of the difference to both hands in one session / RMS of its force
+ *   peak           the largest force / that of one session
+ *   apart_mm       of the world's cube and its copies, the most
+ *   left_mm        the same from half a second after the last touch on
+ *   bytes_down     a second, to one hand; bytes_up: back */
 
 #include <math.h>
 #include <string.h>
 
+#include "bench/remote_hands.h"
 #include "bench/remote_run.h"
 
 #define MARGIN 0.002 /* of the error, over that beside the world */
@@ -203,6 +214,65 @@ static hap_status rows_write(bench *b, const remote_table *table)
   return bench_csv_close(b, csv, HAP_OK);
 }
 
+/* ---- two hands on one cube ---- */
+
+#define PEAK_MOST 3.5
+#define ERROR_MOST 0.4 /* up to: */
+#define ERROR_DELAY_S 0.01
+#define APART_MOST 0.025 /* m */
+#define LEFT_MOST 1e-3   /* m */
+
+static void hands_check(bench *b, const remote_hands *run, double error, double peak)
+{
+  char what[80];
+  (void)snprintf(what, sizeof what, "two hands, %s, %s, %.0f ms", remote_tasks[run->task],
+                 remote_grips[run->grip], 1e3 * run->delay_s);
+  bench_check(b, peak <= PEAK_MOST, "%s: peak %.2f times that of one session", what, peak);
+  if (run->delay_s <= ERROR_DELAY_S) {
+    bench_check(b, error <= ERROR_MOST, "%s: error %.2f of one session", what, error);
+  }
+  bench_check(b, run->apart <= APART_MOST && run->left <= LEFT_MOST,
+              "%s: copies %.1f mm apart, %.2f mm half a second after the last touch", what,
+              1e3 * run->apart, 1e3 * run->left);
+  bench_check(b, run->refused == 0, "%s: %llu messages refused", what,
+              (unsigned long long)run->refused);
+}
+
+static hap_status hands_measure(bench *b, FILE *csv, remote_task task, remote_grip grip)
+{
+  static const double delays_s[] = {0.0, 0.01, 0.05, 0.1};
+  static remote_hands reference;
+  static remote_hands run;
+  reference = (remote_hands){.task = task, .grip = grip, .delay_s = REMOTE_HANDS_HERE};
+  hap_status status = remote_hands_run(&reference, &b->detail);
+  for (size_t i = 0; i < BENCH_COUNT(delays_s) && status >= HAP_OK; ++i) {
+    run = (remote_hands){.task = task, .grip = grip, .delay_s = delays_s[i]};
+    status = remote_hands_run(&run, &b->detail);
+    if (status >= HAP_OK) {
+      double error = remote_hands_error(&run, &reference);
+      double peak = remote_hands_peak(&run, &reference);
+      hands_check(b, &run, error, peak);
+      fprintf(csv, "%s,%s,%g,%.4g,%.4g,%.4g,%.4g,%.6g,%.6g\n", remote_tasks[task],
+              remote_grips[grip], 1e3 * run.delay_s, error, peak, 1e3 * run.apart, 1e3 * run.left,
+              run.bytes_down, run.bytes_up);
+    }
+  }
+  return status;
+}
+
+static hap_status hands_tell(bench *b)
+{
+  hap_status status = HAP_OK;
+  FILE *csv = bench_csv_open(b, "remote_hands",
+                             "task,grip,delay_ms,error,peak,apart_mm,left_mm,bytes_down,bytes_up");
+  for (int task = 0; task < 3 && csv != NULL; ++task) {
+    for (int grip = 0; grip < 3 && status >= HAP_OK; ++grip) {
+      status = hands_measure(b, csv, (remote_task)task, (remote_grip)grip);
+    }
+  }
+  return bench_csv_close(b, csv, status);
+}
+
 hap_status bench_remote(bench *b)
 {
   static remote_table table;
@@ -216,8 +286,13 @@ hap_status bench_remote(bench *b)
       status = scene_measure(b, which, &table);
     }
   }
+  if (status >= HAP_OK && (b->scene == NULL || strcmp(b->scene, "hands") == 0)) {
+    status = hands_tell(b);
+    asked += b->scene != NULL;
+  }
   if (status >= HAP_OK && asked == 0) {
-    status = bench_fail(b, HAP_ERROR_NOT_FOUND, "no scene of that name: those of accuracy");
+    status =
+        bench_fail(b, HAP_ERROR_NOT_FOUND, "no scene of that name: hands, and those of accuracy");
   }
   if (status >= HAP_OK) {
     status = rows_write(b, &table);

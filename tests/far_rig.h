@@ -8,6 +8,7 @@
 #include "session/session_internal.h"
 #include "tests/ode_world.h"
 #include "tests/raw_codec.h"
+#include "tests/shifted_link.h"
 
 #define MS 1000000LL
 #define STEP_HZ 50.0
@@ -16,6 +17,8 @@
 
 /* ---- the world's session ---- */
 
+#define SERVER_ROOM 2 /* clients */
+
 typedef struct server {
   dWorldID world;
   dSpaceID space;
@@ -23,7 +26,8 @@ typedef struct server {
   hap_session *session;
   hap_link *link;
   hapi_far far;
-  raw_codec codec;
+  raw_codec raw[SERVER_ROOM];
+  hapi_codec codecs[SERVER_ROOM];
 } server;
 
 static inline bool cube_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *io)
@@ -52,10 +56,12 @@ static inline void server_finish(void *owned)
   ode_world_end(s->session, s->world, s->space);
   hapi_far_finish(&s->far);
   hap_link_close(s->link);
-  raw_finish(&s->codec);
+  for (int i = 0; i < SERVER_ROOM; ++i) {
+    raw_finish(&s->raw[i]);
+  }
 }
 
-static inline server *server_open_with(hap_surface_fn surface)
+static inline server *server_open_for(hap_surface_fn surface, uint32_t room)
 {
   server *s = tap_own(sizeof *s, server_finish);
   hap_session_def def;
@@ -73,61 +79,27 @@ static inline server *server_open_with(hap_surface_fn surface)
   ode.surface = surface;
   s->session = session_make(&def, &ode);
   REQUIRE(hap_link_local_serve(&s->link, NULL) == HAP_OK);
-  REQUIRE(raw_init(&s->codec, s->session->exchange, true));
-  s->far.world.end = (hapi_end){.link = s->link, .codec = raw_codec_of(&s->codec)};
+  for (int i = 0; i < SERVER_ROOM; ++i) {
+    REQUIRE(raw_init(&s->raw[i], s->session->exchange, true));
+    s->codecs[i] = raw_codec_of(&s->raw[i]);
+  }
+  s->far.world.end = (hapi_end){.link = s->link};
+  s->far.world.codecs = s->codecs;
+  s->far.world.room = room;
   REQUIRE(hapi_session_set_far(s->session, HAPI_SIDE_WORLD, &s->far) == HAP_OK);
   session_run(s->session);
   return s;
+}
+
+static inline server *server_open_with(hap_surface_fn surface)
+{
+  return server_open_for(surface, 1);
 }
 
 static inline server *server_open(void)
 {
   return server_open_with(cube_surface);
 }
-
-/* ---- a link whose owner has another clock ---- */
-
-typedef struct shifted {
-  hap_link *inner;
-  int64_t ahead_ns; /* the inner link's clock - the owner's */
-} shifted;
-
-static inline hap_status shifted_send(void *self, int64_t now_ns, const hap_link_parcel *parcel,
-                                      hap_detail *detail)
-{
-  shifted *s = self;
-  int64_t then_ns = now_ns + s->ahead_ns;
-  hap_status status =
-      parcel->reliable != 0
-          ? hap_link_send_reliably(s->inner, then_ns, &parcel->to, parcel->data, parcel->bytes)
-          : hap_link_send_newest(s->inner, then_ns, &parcel->to, parcel->data, parcel->bytes);
-  (void)hap_link_detail(s->inner, detail);
-  return status;
-}
-
-static inline hap_status shifted_poll(void *self, int64_t now_ns, hap_link_event *out,
-                                      hap_detail *detail)
-{
-  shifted *s = self;
-  hap_status status = hap_link_poll(s->inner, now_ns + s->ahead_ns, out, sizeof *out);
-  out->arrived_ns -= status == HAP_OK ? s->ahead_ns : 0;
-  (void)hap_link_detail(s->inner, detail);
-  return status;
-}
-
-static inline void shifted_close(void *self)
-{
-  shifted *s = self;
-  hap_link_close(s->inner);
-  s->inner = NULL;
-}
-
-static const hap_link_ops shifted_ops = {.abi = HAP_LINK_ABI,
-                                         .size = sizeof(hap_link_ops),
-                                         .name = "shifted",
-                                         .send = shifted_send,
-                                         .poll = shifted_poll,
-                                         .close = shifted_close};
 
 /* ---- the hand's session ---- */
 

@@ -58,6 +58,7 @@ PAGES = {  # example: the page that shows it, first of its C blocks
     "servo_loop": "docs/from-chai3d.md",
     "lossy_link": "docs/remote.md",
     "far_hand": "docs/remote.md",
+    "two_hands": "docs/remote.md",
     "two_processes": "docs/remote.md",
 }
 BLOCK = re.compile(r"```c\n(.*?)```", re.S)
@@ -129,6 +130,17 @@ def check_far_hand(program):
     point(len(rows) == 4 and float(rows[3][0]) > 0.12, "the hand pushes the box", out)
     point(len(rows) == 4 and all(float(f) < -0.5 for _, f in rows[2:]), "the hand feels it", out)
     point("round trip 100 ms" in out, "the round trip is that of the network", out)
+
+
+def check_two_hands(program):
+    out = run(program)
+    rows = rows_of(out, r"^box at (-?[0-9.]+) m, left feels (-?[0-9.]+) N, right (-?[0-9.]+) N$")
+    point(len(rows) == 8 and rows[1] == ("0.0250", "0.00", "0.00"), "nothing is touched at first",
+          out)
+    point(len(rows) == 8 and float(rows[7][0]) > 0.04, "the left hand pushes the box", out)
+    point(len(rows) == 8 and float(rows[7][1]) < -5.0 and float(rows[7][2]) > 4.0,
+          "and the right hand feels it", out)
+    point("2 hands, 1 body shared" in out, "the box is of both", out)
 
 
 def check_two_processes(program):

@@ -561,7 +561,7 @@ static void spoil_contact(hapi_model *m, hapi_near *n)
 static void spoil_pointer(hapi_model *m, hapi_near *n)
 {
   (void)n;
-  hapi_model_contacts(m)[0].pointer = 4;
+  hapi_model_contacts(m)[0].pointer = 8;
 }
 static void spoil_joint(hapi_model *m, hapi_near *n)
 {
@@ -673,7 +673,7 @@ static bool model_can_be(hapi_model *m, hapi_near *n)
   }
   for (uint32_t i = 0; i < m->contact_count; ++i) {
     const hapi_model_contact *c = &hapi_model_contacts(m)[i];
-    good = good && c->slot < wire_capacity.contacts && c->pointer < wire_capacity.pointers &&
+    good = good && c->slot < wire_capacity.contacts && c->pointer < 2 * wire_capacity.pointers &&
            c->told.first + c->told.count <= m->triangle_count;
   }
   for (uint32_t i = 0; i < n->pair_count; ++i) {

@@ -98,7 +98,7 @@ class Frame:
 class Reader:
     def __init__(self, kinds, channel):
         self.kinds = kinds
-        self.numbers = [k for k in sorted(kinds) if (k < 16) == (channel == 2)]
+        self.numbers = [k for k in sorted(kinds) if (k < 17) == (channel == 2)]
         self.known = {}
         self.frames = {0: Frame()}
         for kind in self.numbers:
@@ -247,15 +247,15 @@ def world_lines(reader, frame):
 
 
 def state_lines(reader, frame):
-    s = records(reader, frame, 16)[0]
+    s = records(reader, frame, 17)[0]
     yield (["state", s.one("tick"), signed(s.one("now_ns"))] + s["hand_impulse"] +
            s["owned_impulse"] + s["work.spent_ns"])
-    for b in records(reader, frame, 19):
+    for b in records(reader, frame, 20):
         if b.one("gained all"):
             b.members["gain"][:3] = s["hand_impulse"]
         yield (["moved", b.one("slot"), b.one("generation"), signed(b.one("owned_until_ns"))] +
                b["pose.position"] + b["pose.quat_wxyz"] + b["gain"] + b["owned_pose.quat_wxyz"])
-    for c in records(reader, frame, 20):
+    for c in records(reader, frame, 21):
         yield ["touch", c.one("slot"), c.one("touches")] + c["depth"] + c["force"]
     yield ["end"]
 
@@ -340,9 +340,10 @@ STRUCTS = {"hapi_model": [0], "hapi_near": [1], "hapi_triangle": [2], "hapi_mode
            "hapi_model_course": [5], "hapi_model_contact": [6], "hapi_model_joint": [7],
            "hapi_measured_joint": [8], "hapi_model_feel": [9], "hapi_near_body": [10],
            "hapi_near_geom": [12], "hapi_near_pair": [13], "hapi_near_tool": [14],
-           "hapi_near_tool_pair": [15], "hapi_state": [16], "hapi_state_pointer": [17],
-           "hapi_tool_hull": [18], "hapi_state_body": [19], "hapi_state_contact": [20],
-           "hapi_state_spring": [21], "hapi_state_joint": [22], "hapi_tool_side": [23]}
+           "hapi_near_tool_pair": [15], "hapi_model_hand": [16], "hapi_state": [17],
+           "hapi_state_pointer": [18], "hapi_tool_hull": [19], "hapi_state_body": [20],
+           "hapi_state_contact": [21], "hapi_state_spring": [22], "hapi_state_joint": [23],
+           "hapi_tool_side": [24]}
 
 
 def members_check(root, members):
@@ -366,7 +367,7 @@ def page_check(kinds, members):
         cells = [name for name, count, _ in fields for _ in range(count)]
         if said[len(said) - len(cells):] != cells or len(said) - len(cells) > 2:
             bad.append(f"kind {kind}")
-    report(not bad and len(kinds) == 24, "the_page_lists_all_cells", *bad)
+    report(not bad and len(kinds) == 25, "the_page_lists_all_cells", *bad)
 
 
 def main():

@@ -110,6 +110,7 @@ static inline const char *compare_models(hapi_model *a, hapi_model *b)
   COMPARE_LIST(HAPI_WIRE_CONTACT, hapi_model_contacts, contact_count, false);
   COMPARE_LIST(HAPI_WIRE_JOINT, hapi_model_joints, joint_count, false);
   COMPARE_LIST(HAPI_WIRE_FEEL, hapi_model_feels, feel_count, false);
+  COMPARE_LIST(HAPI_WIRE_HAND, hapi_model_hands, hand_count, false);
   if (a->course_count != b->course_count) {
     return "course_count";
   }

@@ -276,6 +276,23 @@ static void wire_head(const wire_world *w, hapi_model *model)
     dice_fill(&e, &f->feel.impact.force, 3);
     dice_fill(&e, &f->feel.adhesion, 3);
   }
+  model->hand_count = (uint32_t)(w->number / 20) % 3;
+  for (uint32_t i = 0; i < model->hand_count; ++i) {
+    hapi_model_hand *h = &hapi_model_hands(model)[i];
+    wire_dice e = dice_of(12, i, 1);
+    memset(h, 0, sizeof *h);
+    h->number = i + 1;
+    h->generation = 3;
+    h->radius = dice_unit(&e) + 1.0;
+    h->stiffness = dice_unit(&e) + 1.0;
+    h->damping = dice_unit(&e) + 1.0;
+    h->friction = dice_unit(&e) + 1.0;
+    h->finger_radius = dice_unit(&e) + 1.0;
+    h->hull.count = 4 * i;
+    dice_fill(&e, h->hull.points[0], 3 * (int)h->hull.count);
+    dice_pose(&d, &h->pose);
+    dice_twist(&d, &h->twist);
+  }
 }
 
 static void wire_geoms(const wire_world *w, hapi_model *model, hapi_near *near)

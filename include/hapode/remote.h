@@ -3,8 +3,9 @@
 #ifndef HAPODE_REMOTE_H
 #define HAPODE_REMOTE_H
 
-/* Hands far from the world: a session with a world and no hand, and a session with a hand and no
- * world, with a link between them (docs/remote.md). Model CONTACT. One hand's session at a time.
+/* Hands far from the world: a session with a world and no hand, and sessions with a hand and no
+ * world, with a link between them (docs/remote.md). Model CONTACT. max_pointers of the world's
+ * session is the room for the hands of all sessions: 16 at most.
  *
  * Both sessions have the same max_bodies, max_contacts, max_pointers, max_hull_points and
  * haptic_hz. hap_expert_def.look_ahead of the world's is the round trip and its jitter. */
@@ -23,9 +24,11 @@ HAP_BEGIN_DECLS
  * start, and without pointers. The link is borrowed: it belongs to the physics thread while the
  * session runs, and is closed after hap_session_destroy. Drives THREADS, FRAME and LOCKSTEP.
  *
- * When the hand's session leaves, its bodies are the world's again. Another one may join then; one
- * that comes before is told why it may not. A session that is served or connected is started once.
- * What a hand's session does to bodies is bounded by hap_session_set_client_limits.
+ * When a hand's session leaves, its bodies are the world's again. One that finds no room is told
+ * so. Bodies that hands of several sessions may touch are moved by a loop of this session, which
+ * drives THREADS and FRAME run in a haptic and a contact thread; with max_pointers 1 there is none.
+ * A session that is served or connected is started once. What a hand's session does to bodies is
+ * bounded by hap_session_set_client_limits.
  *
  * HAP_ERROR_ARGUMENT: a NULL. HAP_ERROR_STATE: started already. HAP_ERROR_UNSUPPORTED: another
  * model than CONTACT, looking back, a contact callback, or a session that is recorded or played;
@@ -66,7 +69,7 @@ HAP_API hap_status hap_session_set_client_limits(hap_session *session, double fo
  * end. */
 typedef struct hap_remote_state {
   uint32_t size;            /* bytes filled in */
-  uint32_t joined;          /* 1: the other session is there, and both fit */
+  uint32_t joined;          /* 1: the other session is there, and both fit. World's: how many are */
   uint64_t joins;           /* of hands' sessions so far; of a hand's session 0 or 1 */
   uint64_t refused;         /* messages that were not understood, or from somebody else */
   uint64_t failed;          /* messages that could not be sent */
@@ -79,6 +82,11 @@ typedef struct hap_remote_state {
   /* World's session: hands' sessions that were told why they may not join or stay. Hand's session:
    * 1: it was told so, and detail says why */
   uint64_t turned_away;
+  /* World's session: bodies in the newest model that hands of several sessions may touch */
+  uint64_t shared;
+  /* Hand's session: models with a hand of another session for which it had no room; max_pointers is
+   * for those as well */
+  uint64_t left_out;
   /* Hand's session: 1: the bodies of what it was created over are drawn as the server's are. 0: it
    * is not joined, or its world was built otherwise, and detail says so */
   uint64_t drawn;

@@ -38,7 +38,7 @@ typedef struct hapi_pointer_setup {
   double virtual_mass;
   double virtual_inertia;
   uint32_t effector;
-  uint32_t reserved;
+  uint32_t foreign; /* 1: the hand of another session; in recordings 0 */
 } hapi_pointer_setup;
 
 /* Bits of a setting beside those of the API. */

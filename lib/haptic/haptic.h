@@ -77,6 +77,10 @@ hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, h
 void hapi_haptic_explain(hapi_haptic *haptic, hap_pointer_id id, hap_detail *out);
 hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
                                   const hap_twist *twist);
+/* The same; from the first time on, of the loop, the target goes on as fast, for the second one;
+ * then it stands. */
+hap_status hapi_haptic_carry_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
+                                    const hap_twist *twist, const int64_t told_carried_ns[2]);
 /* [any] Changes what was set last by merge, which says what is wrong, and hands it to the loop.
  * of: merge's; io_hull: of HAP_SET_SHAPE. */
 typedef hap_status (*hapi_setting_merge)(const void *of, hapi_pointer_setting *io,
@@ -97,6 +101,8 @@ hap_status hapi_haptic_workspace(hapi_haptic *haptic, hap_pointer_id id, double 
                                  double out_high[3]);
 hap_status hapi_haptic_get_pointer(hapi_haptic *haptic, hap_pointer_id id, hap_pointer_state *out);
 bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id);
+/* [any] Whether a tick has had it. */
+bool hapi_haptic_pointer_acts(hapi_haptic *haptic, hap_pointer_id id);
 /* [any] Pointer and device in the world at time_ns; HAP_STALE: later than the newest tick by more
  * than grace_ns; HAP_ERROR_NOT_FOUND: also while no tick has had the pointer. */
 hap_status hapi_haptic_pointer_poses(hapi_haptic *haptic, hap_pointer_id id, int64_t time_ns,

@@ -21,6 +21,7 @@
 #include "haptic/outputs_box.h"
 #include "haptic/own_hands.h"
 #include "haptic/settings_box.h"
+#include "haptic/target.h"
 #include "record/tape.h"
 #include "sync/triple_buffer.h"
 #include "tick/black_box.h"
@@ -36,11 +37,6 @@ typedef enum hapi_pointer_phase {
   HAPI_POINTER_PAUSING = 5, /* as LEAVING and LEFT, and its id stays valid: */
   HAPI_POINTER_PAUSED = 6   /* its device is being started again, or did not start */
 } hapi_pointer_phase;
-
-typedef struct hapi_pointer_target {
-  hap_pose pose;
-  hap_twist twist;
-} hapi_pointer_target;
 
 typedef struct hapi_pointer_slot {
   _Atomic int phase;

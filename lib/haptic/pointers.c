@@ -6,6 +6,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/pointer_id.h"
+#include "base/pose.h"
 #include "base/safety.h"
 #include "base/vec.h"
 #include "device/device.h"
@@ -34,6 +35,7 @@ static void pointer_activate(hapi_haptic *haptic, uint32_t index)
   haptic->tick.pointers.high =
       index >= haptic->tick.pointers.high ? index + 1 : haptic->tick.pointers.high;
   p->generation = slot->generation;
+  p->handle.foreign = def->foreign != 0;
   slot->set.shape = 0;
   hapi_pointer_set_shape(haptic, index);
   p->device.three_dof = slot->has_device && info->dof < 6;
@@ -205,6 +207,19 @@ static hap_status device_read_once(hapi_haptic *haptic, uint32_t index, int64_t 
   return device->drive.read_status;
 }
 
+static void target_carry(const hapi_pointer_target *target, int64_t now_ns, hapi_pointer_input *io)
+{
+  int64_t since_ns = now_ns - target->told_ns;
+  bool goes_on = since_ns < target->carried_ns;
+  double seconds = 1e-9 * (double)(goes_on ? since_ns : target->carried_ns);
+  if (seconds > 0.0) {
+    hapi_pose_move(&io->pose, &target->twist, seconds);
+  }
+  if (!goes_on) {
+    io->twist = (hap_twist){{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+  }
+}
+
 static void ask_device(hapi_haptic *haptic, uint32_t index, int64_t now_ns, hapi_pointer_input *io)
 {
   hapi_pointer_slot *slot = &haptic->slots[index];
@@ -222,6 +237,9 @@ static void ask_device(hapi_haptic *haptic, uint32_t index, int64_t now_ns, hapi
   const hapi_pointer_target *target = &slot->targets[hapi_triple_front(&slot->target_buffer)];
   io->pose = target->pose;
   io->twist = target->twist;
+  if (target->carried_ns > 0) {
+    target_carry(target, now_ns, io);
+  }
 }
 
 void hapi_pointers_read(hapi_haptic *haptic, int64_t now_ns)
@@ -508,6 +526,12 @@ bool hapi_haptic_has_pointer(hapi_haptic *haptic, hap_pointer_id id)
   return find_slot(haptic, id) != NULL;
 }
 
+bool hapi_haptic_pointer_acts(hapi_haptic *haptic, hap_pointer_id id)
+{
+  const hapi_pointer_slot *slot = find_slot(haptic, id);
+  return slot != NULL && atomic_load(&slot->phase) == HAPI_POINTER_ACTIVE;
+}
+
 /* With its lock taken; NULL: it is not there, or it was removed in between. */
 hapi_pointer_slot *hapi_slot_lock(hapi_haptic *haptic, hap_pointer_id id)
 {
@@ -724,22 +748,37 @@ hap_status hapi_haptic_restart_pointer(hapi_haptic *haptic, hap_pointer_id id, h
   return device_resume(haptic, device, detail);
 }
 
-hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
-                                  const hap_twist *twist)
+static hap_status target_set(hapi_haptic *haptic, hap_pointer_id id,
+                             const hapi_pointer_target *target)
 {
-  const hap_twist rest = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   hapi_pointer_slot *slot = hapi_slot_lock(haptic, id);
   if (slot == NULL) {
     return HAP_ERROR_NOT_FOUND;
   }
   bool free = slot->ops == NULL;
   if (free) {
-    slot->targets[hapi_triple_back(&slot->target_buffer)] =
-        (hapi_pointer_target){*pose, twist != NULL ? *twist : rest};
+    slot->targets[hapi_triple_back(&slot->target_buffer)] = *target;
     hapi_triple_publish(&slot->target_buffer);
   }
   pthread_mutex_unlock(&slot->lock);
   return free ? HAP_OK : HAP_ERROR_STATE;
+}
+
+hap_status hapi_haptic_set_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
+                                  const hap_twist *twist)
+{
+  hapi_pointer_target target = {.pose = *pose};
+  if (twist != NULL) {
+    target.twist = *twist;
+  }
+  return target_set(haptic, id, &target);
+}
+
+hap_status hapi_haptic_carry_target(hapi_haptic *haptic, hap_pointer_id id, const hap_pose *pose,
+                                    const hap_twist *twist, const int64_t told_carried_ns[2])
+{
+  const hapi_pointer_target target = {*pose, *twist, told_carried_ns[0], told_carried_ns[1]};
+  return target_set(haptic, id, &target);
 }
 
 hap_status hapi_haptic_set_pointer(hapi_haptic *haptic, hap_pointer_id id, hapi_setting_merge merge,

@@ -51,6 +51,14 @@ typedef struct hapi_body_stay {
   double spin;     /* rad/s, likewise */
 } hapi_body_stay;
 
+/* Of a copy of a body that another loop moves. */
+typedef struct hapi_body_draw {
+  bool any;
+  double left[6];  /* m, rad about world axes: how far that one is away */
+  hap_twist twist; /* of that one */
+  double gain[3];  /* N s: of pointers up to the last tick */
+} hapi_body_draw;
+
 /* Hundreds of them are more than a near cache holds: what every tick reads or tells stands
  * together, first that of all models, then that of some; what a sync writes and few ask for comes
  * last. */
@@ -82,6 +90,7 @@ typedef struct hapi_local_body {
   hapi_model_body given; /* of the newest model */
   hapi_body_shown shown;
   hapi_body_left left;
+  hapi_body_draw draw;
 } hapi_local_body;
 
 /* Of a driven body: how physics expects it to go, and what the loop was off by when it was told. */
@@ -99,6 +108,7 @@ typedef struct hapi_bodies {
   uint32_t *live;            /* slots in the model, live_count */
   uint32_t live_count;
   uint32_t braced;         /* of the model */
+  uint32_t copies;         /* likewise, of bodies that another loop moves */
   uint32_t high;           /* beyond the highest slot that was ever used */
   uint32_t resting;        /* at the tick's begin */
   uint64_t stays;          /* numbers of hapi_body_stay that were given, since start */

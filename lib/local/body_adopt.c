@@ -8,6 +8,7 @@
 #include "base/pose.h"
 #include "base/vec.h"
 #include "local/body_course.h"
+#include "local/body_draw.h"
 #include "local/body_stay.h"
 
 static void twist_advance(double seconds, const double b[6], hap_twist *io)
@@ -75,6 +76,9 @@ static void twist_scale(double scale, hap_twist *io)
 static void body_disown(hapi_local_body *body, const hapi_tick_facts *before)
 {
   int64_t now_ns = before->now_ns;
+  if ((body->flags & HAPI_BODY_SHARED) != 0) { /* a copy: there is nothing to tell */
+    body->flags &= ~(uint32_t)(HAPI_BODY_OWNED | HAPI_BODY_SHARED);
+  }
   if ((body->flags & HAPI_BODY_OWNED) != 0) {
     body->left.pose = body->pose;
     body->left.twist = body->twist;
@@ -144,6 +148,7 @@ static void adopt_contact_body(hapi_local_body *body, const hapi_model_body *in,
       memset(&body->twist, 0, sizeof body->twist);
     }
   }
+  hapi_body_draw_adopt(body, in, owned && owns ? age_s : 0.0, owned && owns);
   body->flags = flags;
   body->epoch = in->epoch;
   take_given(body, in);
@@ -247,7 +252,7 @@ void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, int64_t now
 {
   const hapi_model_body *in = hapi_model_bodies(model);
   bodies_leave(bodies, model, before);
-  bodies->braced = 0;
+  bodies->braced = bodies->copies = 0;
   bodies_change_time(bodies, model, before);
   for (uint32_t i = 0; i < model->body_count; ++i) {
     HAPI_ASSERT_UNIT_QUAT(in[i].pose.quat_wxyz);
@@ -268,6 +273,7 @@ void hapi_local_bodies_adopt(hapi_bodies *bodies, hapi_model *model, int64_t now
     }
     bodies->live[i] = in[i].slot;
     bodies->braced += (in[i].flags & HAPI_BODY_BRACED) != 0;
+    bodies->copies += (in[i].flags & HAPI_BODY_SHARED) != 0;
     if (in[i].slot >= bodies->high) {
       bodies->high = in[i].slot + 1;
     }

@@ -95,26 +95,9 @@ void hapi_physics_run_edits(hapi_physics *physics)
   physics->lock.editable = false;
 }
 
-/* Another loop knows no body and no contact, and has given nothing. What the one before had is
- * ODE's. */
-static void loop_renew(hapi_physics *physics)
-{
-  for (uint32_t i = 0; i < physics->world.bodies.high; ++i) {
-    physics->world.bodies.entries[i].loop_owned = false;
-  }
-  hapi_slots_reset(&physics->near);
-  hapi_neighbors_reset(&physics->near);
-  hapi_account_renew(&physics->account);
-  hapi_feedback_reset(&physics->feedback);
-  physics->cycle.state = NULL;
-}
-
 void hapi_physics_take_state(hapi_physics *physics)
 {
   HAPI_ASSERT(hapi_lock_in_callback(&physics->lock));
-  if (atomic_exchange(&physics->wanted.renews_loop, 0) != 0) {
-    loop_renew(physics);
-  }
   hapi_state *newest = hapi_exchange_state_take(physics->config.exchange);
   physics->cycle.has_new_state = newest != NULL;
   hapi_tape_state(&physics->tape, physics->config.exchange, newest != NULL);

@@ -69,7 +69,6 @@ hap_status hapi_physics_create(const hapi_physics_config *config, const struct h
   hapi_physics_listen(physics);
   physics->cycle.model = config->model;
   physics->wanted.latency_s = -1.0;
-  atomic_init(&physics->wanted.renews_loop, 0);
   atomic_init(&physics->wanted.model, (int)config->model);
   atomic_init(&physics->wanted.effects, config->effects);
   atomic_init(&physics->wanted.time_scale, 1.0F);
@@ -372,11 +371,6 @@ void hapi_physics_set_calls(hapi_physics *physics, const hapi_physics_calls *cal
 void hapi_physics_set_exchange(hapi_physics *physics, hapi_exchange *exchange)
 {
   physics->config.exchange = exchange;
-}
-
-void hapi_physics_renew_loop(hapi_physics *physics)
-{
-  atomic_store(&physics->wanted.renews_loop, 1);
 }
 
 void hapi_physics_set_latency(hapi_physics *physics, double seconds)

@@ -101,10 +101,6 @@ void hapi_physics_hear(hapi_physics *physics, uint64_t number, const struct hapi
 void hapi_physics_draw(hapi_physics *physics, struct hapi_model *model, double period_s,
                        const int64_t times_ns[2]);
 
-/* [any] Another loop sends states from now on: its totals begin at zero, and it knows no body.
- * Before the next cycle takes one. */
-void hapi_physics_renew_loop(hapi_physics *physics);
-
 /* [control] LOCKSTEP: time from a cycle to the use of its model; negative: the model's own. */
 void hapi_physics_set_latency(hapi_physics *physics, double seconds);
 

@@ -35,13 +35,6 @@ void hapi_account_reset(hapi_account *account)
   memset(account->bodies, 0, account->capacity * sizeof *account->bodies);
 }
 
-void hapi_account_renew(hapi_account *account)
-{
-  hapi_account_reset(account);
-  hapi_v3_copy(account->counts.hand_impulse, account->counts.hand_before);
-  memset(account->counts.owned_taken, 0, sizeof account->counts.owned_taken);
-}
-
 /* ---- in and out ---- */
 
 /* What the newest message says of the body of a slot; NULL: nothing. */
@@ -180,8 +173,7 @@ static void take_body(hapi_account *account, uint32_t index)
 void hapi_reconcile_take(hapi_account *account)
 {
   HAPI_ASSERT(account->cycle->has_new_state && account->cycle->state != NULL);
-  hapi_v3_add(account->counts.hand_before, account->cycle->state->hand_impulse,
-              account->counts.hand_impulse);
+  hapi_v3_copy(account->cycle->state->hand_impulse, account->counts.hand_impulse);
   /* Bodies that the loop owns got their share in the loop: ODE takes their velocity, not an
    * impulse. */
   hapi_account_counts *f = &account->counts;

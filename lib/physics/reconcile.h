@@ -39,7 +39,6 @@ typedef struct hapi_slot_account {
 typedef struct hapi_account_counts {
   double world_impulse[3]; /* given to the world: predictions and overwrites */
   double hand_impulse[3];  /* given to the bodies, as the loops reported */
-  double hand_before[3];   /* the same of loops before this one */
   double owned_taken[3];   /* of hapi_state.owned_impulse, in world_impulse */
   uint64_t states_rejected;
   uint64_t dropped; /* points of hulls that found no room in a model */
@@ -61,7 +60,6 @@ bool hapi_account_create(hapi_account *account, const hapi_cycle *cycle, hapi_wo
                          const hapi_slots *slots);
 void hapi_account_finish(hapi_account *account);
 void hapi_account_reset(hapi_account *account); /* all slots begin anew */
-void hapi_account_renew(hapi_account *account); /* and another loop's totals begin at zero */
 
 static inline hapi_slot_account *hapi_account_of(const hapi_account *account, uint32_t index)
 {

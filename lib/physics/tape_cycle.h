@@ -38,7 +38,6 @@ typedef struct hapi_wanted {
   _Atomic float time_scale;  /* as a recording keeps it */
   _Atomic int64_t period_ns; /* of physics in other models than SINGLE */
   double latency_s;          /* negative: the model's own */
-  _Atomic int renews_loop;   /* 1: states are of another loop from now on */
 } hapi_wanted;
 
 /* s, from the next cycle to the one after it. */

@@ -141,6 +141,7 @@ typedef struct hapi_pointer_glides {
 
 /* Where the device is in the world. */
 typedef struct hapi_pointer_handle {
+  bool foreign; /* of another session's device: the application does not hear of it */
   double position[3];
   double velocity[3];
   double quat[4];

@@ -92,7 +92,8 @@ static void twist_scale(double scale, hap_twist *io)
 /* A model is in the hand's time, in which masses are larger and speeds are lower. */
 static void body_read(const hapi_model_body *in, double scale, hapi_bound_body *out)
 {
-  out->flags = in->flags;
+  bool copy = (in->flags & HAPI_BODY_SHARED) != 0; /* the client is not asked about it */
+  out->flags = copy ? (uint32_t)HAPI_BODY_DRIVEN : in->flags;
   out->epoch = in->epoch;
   out->mass = in->mass * scale * scale;
   hapi_v3_scale(1.0 / (scale * scale), in->gravity, out->gravity);

@@ -31,8 +31,9 @@ void hapi_end_poll(hapi_end *end, hapi_end_hear hear, void *of)
     bool theirs = event.kind == HAP_LINK_MESSAGE && end->joined && event.peer == end->peer;
     hap_detail why = {""};
     if (event.kind == HAP_LINK_MESSAGE && !theirs && event.peer == end->peer) {
-      ++end->refused; /* it was told to go: why, stays to be read */
-    } else if (event.kind == HAP_LINK_MESSAGE && !theirs) {
+      continue; /* it has overtaken that the peer has joined, or comes after its end */
+    }
+    if (event.kind == HAP_LINK_MESSAGE && !theirs) {
       snprintf(why.text, sizeof why.text, "it is of peer %u, who has no part here", event.peer);
       hapi_end_refuse(end, &why);
     } else if (event.kind != HAP_LINK_MESSAGE || event.channel == HAPI_TERMS_CHANNEL ||

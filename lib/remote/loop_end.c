@@ -13,12 +13,14 @@ hap_status hapi_loop_end_begin(hapi_loop_end *loop)
 {
   uint32_t bodies = hapi_exchange_capacity(loop->exchange)->bodies;
   loop->left = hapi_alloc_array(bodies, sizeof *loop->left);
-  return loop->left != NULL ? HAP_OK : HAP_ERROR_MEMORY;
+  bool hands = hapi_hands_create(&loop->hands, hapi_exchange_capacity(loop->exchange));
+  return hands && loop->left != NULL ? HAP_OK : HAP_ERROR_MEMORY;
 }
 
 void hapi_loop_end_finish(hapi_loop_end *loop)
 {
   hapi_free(loop->left);
+  hapi_hands_finish(&loop->hands);
   loop->left = NULL;
 }
 
@@ -157,6 +159,7 @@ void hapi_loop_end_receive(hapi_loop_end *loop, int64_t now_ns)
   int64_t trip_ns;
   model_shift(hapi_stamps_offset(&loop->stamps, &trip_ns), now_ns, model);
   trip_judge(loop, trip_ns);
+  hapi_hands_follow(&loop->hands, now_ns, model, near);
   if (loop->draws) { /* one way late; jitter is not drawn */
     const int64_t times_ns[2] = {earlier_of(model->state_ns + trip_ns / 2, now_ns), now_ns};
     loop->view.draw(loop->view.of, model, loop->terms.period_s, times_ns);
@@ -193,6 +196,7 @@ void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns)
     return;
   }
   int64_t trip_ns;
+  hapi_hands_hide(&loop->hands, state);
   if (loop->stamps.count > 0) { /* before, no body is the loop's, and hands can be told already */
     state_shift(loop, hapi_stamps_offset(&loop->stamps, &trip_ns), state);
   }

@@ -7,6 +7,7 @@
  * one side, the client's link on the other. */
 
 #include "remote/end.h"
+#include "remote/hands.h"
 #include "sync/exchange.h"
 
 /* When the loop let go of a body, in its own clock and as the world was told. The world tells one
@@ -42,6 +43,7 @@ typedef struct hapi_loop_end {
   bool draws;             /* the world has the same bodies, and tells where they are */
   bool said_far;          /* that the world does not look ahead far enough */
   hapi_loop_left *left;   /* by slot of a body */
+  hapi_hands hands;       /* of others; its calls are set before begin */
 } hapi_loop_end;
 
 /* [control] The exchange is set. HAP_ERROR_MEMORY. */

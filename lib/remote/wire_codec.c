@@ -56,7 +56,7 @@ static bool wire_give(void *self, void *const messages[2])
 
 /* ---- life ---- */
 
-static hap_status wire_open(hapi_wire_codec *codec)
+hap_status hapi_wire_codec_open(hapi_wire_codec *codec)
 {
   return codec->world ? hapi_wire_server_create(&codec->capacity, &codec->server)
                       : hapi_wire_client_create(&codec->capacity, &codec->client);
@@ -75,17 +75,23 @@ static void wire_reset(void *self)
 {
   hapi_wire_codec *codec = self;
   wire_close(codec);
-  if (wire_open(codec) < HAP_OK) {
+  if (hapi_wire_codec_open(codec) < HAP_OK) {
     hapi_log(HAP_LOG_ERROR, "no memory for a codec: the peer that joins gets nothing");
   }
+}
+
+void hapi_wire_codec_prepare(hapi_wire_codec *codec, const hapi_capacity *capacity, bool world,
+                             hapi_codec *out)
+{
+  *codec = (hapi_wire_codec){.capacity = *capacity, .world = world};
+  *out = (hapi_codec){codec, wire_send, wire_take, wire_give, wire_reset};
 }
 
 hap_status hapi_wire_codec_init(hapi_wire_codec *codec, const hapi_capacity *capacity, bool world,
                                 hapi_codec *out)
 {
-  *codec = (hapi_wire_codec){.capacity = *capacity, .world = world};
-  *out = (hapi_codec){codec, wire_send, wire_take, wire_give, wire_reset};
-  return wire_open(codec);
+  hapi_wire_codec_prepare(codec, capacity, world, out);
+  return hapi_wire_codec_open(codec);
 }
 
 void hapi_wire_codec_finish(hapi_wire_codec *codec)

@@ -19,6 +19,10 @@ typedef struct hapi_wire_codec {
 /* world: of the world's end. *out is *codec, which outlives it. HAP_ERROR_MEMORY. */
 hap_status hapi_wire_codec_init(hapi_wire_codec *codec, const hapi_capacity *capacity, bool world,
                                 hapi_codec *out);
-void hapi_wire_codec_finish(hapi_wire_codec *codec); /* zeroed allowed */
+/* The same in two: until it is opened, or reset for a peer, it takes and sends nothing. */
+void hapi_wire_codec_prepare(hapi_wire_codec *codec, const hapi_capacity *capacity, bool world,
+                             hapi_codec *out);
+hap_status hapi_wire_codec_open(hapi_wire_codec *codec); /* HAP_ERROR_MEMORY */
+void hapi_wire_codec_finish(hapi_wire_codec *codec);     /* zeroed allowed */
 
 #endif

@@ -162,7 +162,7 @@ static void ferry_call(const hap_session *session, void (*call)(void *of, int64_
 
 static bool has_loop(const hap_session *session)
 {
-  return session->ferry.side != HAPI_SIDE_WORLD;
+  return session->ferry.side != HAPI_SIDE_WORLD || session->ferry.has_loop;
 }
 
 static bool has_world(const hap_session *session)

@@ -4,9 +4,6 @@
 
 #include "base/clock.h"
 #include "base/log.h"
-#include "base/pointer_setup.h"
-#include "base/safety.h"
-#include "base/vec.h"
 #include "session/session_internal.h"
 
 /* Physics and loop without memory in common: what one knows of the other comes in messages. */
@@ -35,7 +32,8 @@ hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
                              "world and loop of one session are apart in drive LOCKSTEP alone");
   }
   hapi_exchange *exchange = session->ferry.exchange;
-  if (exchange == NULL && ferry->side == HAPI_SIDE_BOTH &&
+  bool apart = ferry->side == HAPI_SIDE_BOTH || ferry->has_loop;
+  if (exchange == NULL && apart &&
       hapi_exchange_create(hapi_exchange_capacity(session->exchange), &exchange) < HAP_OK) {
     return hapi_session_fail(session, HAP_ERROR_MEMORY, "no memory for the messages of physics");
   }
@@ -158,9 +156,50 @@ static hap_status far_begin(hap_session *session, int64_t start_ns)
   return HAP_OK;
 }
 
-static void far_renew(void *of)
+/* ---- hands of others: pointers without a device ---- */
+
+/* What a message says is what a pointer may be, or the hand is left out. */
+static uint64_t hand_add(void *of, const hapi_model_hand *hand)
 {
-  hapi_physics_renew_loop(of);
+  hap_pointer_def def;
+  hapi_pointer_setup setup;
+  hap_pointer_id id;
+  hap_detail why;
+  hap_pointer_def_init(&def, sizeof def);
+  def.radius = hand->radius;
+  def.stiffness = hand->stiffness;
+  def.damping = hand->damping;
+  def.friction = hand->friction;
+  def.finger_radius = hand->finger_radius;
+  def.hull_points = hand->hull.count;
+  def.hull_xyz = hand->hull.count > 0 ? hand->hull.points[0] : NULL;
+  if (hapi_session_read_pointer(&def, &setup, &why) < HAP_OK) {
+    return 0;
+  }
+  setup.coupling = HAP_COUPLING_DIRECT;
+  setup.foreign = 1;
+  if (hapi_haptic_add_pointer(of, &setup, &id, &why) < HAP_OK) {
+    return 0;
+  }
+  return id.v;
+}
+
+static bool hand_acts(void *of, uint64_t id)
+{
+  return hapi_haptic_pointer_acts(of, (hap_pointer_id){id});
+}
+
+static void hand_remove(void *of, uint64_t id)
+{
+  if (hapi_haptic_remove_pointer(of, (hap_pointer_id){id}) < HAP_OK) {
+    hapi_log(HAP_LOG_WARNING, "the hand of another session stays: the loop does not come back");
+  }
+}
+
+static void hand_put(void *of, uint64_t id, const hapi_model_hand *hand, int64_t now_ns)
+{
+  const int64_t times_ns[2] = {now_ns, HAPI_HAND_CARRIED_NS};
+  (void)hapi_haptic_carry_target(of, (hap_pointer_id){id}, &hand->pose, &hand->twist, times_ns);
 }
 
 static hap_status far_fill(const hap_session *session, hapi_far *far)
@@ -175,8 +214,6 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
   far->world.terms.limits = (hapi_limits){HAP_CLIENT_FORCE, HAP_CLIENT_SPEED};
   far->loop.limits = session->ferry.limits;
   far->world.exchange = apart != NULL ? apart : session->exchange;
-  far->world.renew = far_renew;
-  far->world.renew_of = session->physics;
   far->world.bodies = (hapi_scenery_source){session->physics, far_places, far_tell};
   if (session->ferry.side == HAPI_SIDE_LOOP) {
     far->loop.view = (hapi_loop_view){session->physics, far_hear, far_draw};
@@ -184,41 +221,17 @@ static hap_status far_fill(const hap_session *session, hapi_far *far)
   far->loop.exchange = session->exchange;
   far->lockstep = def->drive == HAP_DRIVE_LOCKSTEP;
   pthread_mutex_init(&far->lock, NULL);
+  far->world.loop = session->ferry.has_loop ? session->exchange : NULL;
+  far->world.hands.calls = far->loop.hands.calls =
+      (hapi_hands_calls){session->haptic, hand_add, hand_acts, hand_remove, hand_put};
   HAPI_TRY(hapi_world_end_begin(&far->world));
   return hapi_loop_end_begin(&far->loop);
-}
-
-/* ---- what a hand can do ---- */
-
-#define REACH_M 0.1 /* a hand presses a pointer no farther into what does not give way */
-
-/* A body gets what the pointer's spring gives, also where the device gives less to the hand. */
-hapi_limits hapi_session_limits_of(const hapi_pointer_setup *setup)
-{
-  double felt = setup->force_scale > 0.0 ? setup->max_force / setup->force_scale : 0.0;
-  return (hapi_limits){.force = hapi_max(felt, REACH_M * setup->stiffness),
-                       .speed = HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale};
-}
-
-void hapi_session_allow(hap_session *session, const hapi_limits *more)
-{
-  hapi_far *far = session->ferry.far;
-  pthread_mutex_lock(&session->detail_lock); /* it is for one short text, and short enough */
-  hapi_limits *sum = &session->ferry.limits;
-  sum->force = hapi_max(sum->force + more->force, 0.0);
-  sum->speed = hapi_max(sum->speed, more->speed);
-  const hapi_limits now = *sum;
-  pthread_mutex_unlock(&session->detail_lock);
-  if (far != NULL) {
-    pthread_mutex_lock(&far->lock);
-    far->loop.limits = now;
-    pthread_mutex_unlock(&far->lock);
-  }
 }
 
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far)
 {
   hapi_ferry ferry = {.side = side, .of = far, .far = far};
+  ferry.has_loop = side == HAPI_SIDE_WORLD && far->world.codecs != NULL && far->world.room > 1;
   if (side != HAPI_SIDE_LOOP) {
     ferry.before_cycle = far_before_cycle;
     ferry.after_cycle = far_after_cycle;

@@ -58,6 +58,7 @@ typedef struct hapi_ferry {
   hap_status (*start)(hap_session *session);
   void (*stop)(hap_session *session);
   void (*free)(hap_session *session); /* own */
+  bool has_loop;                      /* of a world's side: beside the loops far away */
 } hapi_ferry;
 
 /* For tests and the bench: after run_ticks, stop_ticks are left out; 0: none. */

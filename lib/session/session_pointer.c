@@ -102,6 +102,52 @@ hap_status hapi_session_check_coupling(const hap_session *session, const hapi_po
                          hap_coupling_name(setup->coupling), hap_model_name(session->def.model));
 }
 
+/* ---- what a hand can do ---- */
+
+#define REACH_M 0.1 /* a hand presses a pointer no farther into what does not give way */
+
+/* A body gets what the pointer's spring gives, also where the device gives less to the hand. */
+hapi_limits hapi_session_limits_of(const hapi_pointer_setup *setup)
+{
+  double felt = setup->force_scale > 0.0 ? setup->max_force / setup->force_scale : 0.0;
+  return (hapi_limits){.force = hapi_max(felt, REACH_M * setup->stiffness),
+                       .speed = HAPI_SAFETY_SPEED_LIMIT * setup->motion_scale};
+}
+
+void hapi_session_allow(hap_session *session, const hapi_limits *more)
+{
+  hapi_far *far = session->ferry.far;
+  pthread_mutex_lock(&session->detail_lock); /* it is for one short text, and short enough */
+  hapi_limits *sum = &session->ferry.limits;
+  sum->force = hapi_max(sum->force + more->force, 0.0);
+  sum->speed = hapi_max(sum->speed, more->speed);
+  const hapi_limits now = *sum;
+  pthread_mutex_unlock(&session->detail_lock);
+  if (far != NULL) {
+    pthread_mutex_lock(&far->lock);
+    far->loop.limits = now;
+    pthread_mutex_unlock(&far->lock);
+  }
+}
+
+static hap_status hand_add(hap_session *session, const hapi_pointer_setup *setup,
+                           hap_pointer_id *out, hap_detail *detail)
+{
+  hapi_far *far = session->ferry.far;
+  if (far != NULL) {
+    pthread_mutex_lock(&far->lock);
+  }
+  hap_status status = hapi_haptic_add_pointer(session->haptic, setup, out, detail);
+  if (far != NULL) {
+    pthread_mutex_unlock(&far->lock);
+  }
+  if (status >= HAP_OK) {
+    const hapi_limits limits = hapi_session_limits_of(setup);
+    hapi_session_allow(session, &limits);
+  }
+  return status;
+}
+
 hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap_pointer_id *out)
 {
   HAPI_TRY(hapi_session_may_change(session));
@@ -122,11 +168,7 @@ hap_status hap_pointer_add(hap_session *session, const hap_pointer_def *def, hap
   }
   if (status >= HAP_OK) {
     hapi_quat_normalize(setup.pose_world_device.quat_wxyz);
-    status = hapi_haptic_add_pointer(session->haptic, &setup, out, &detail);
-  }
-  if (status >= HAP_OK) {
-    const hapi_limits limits = hapi_session_limits_of(&setup);
-    hapi_session_allow(session, &limits);
+    status = hand_add(session, &setup, out, &detail);
   }
   return hapi_session_note(session, status, &detail);
 }

@@ -12,15 +12,48 @@
 
 struct hapi_remote {
   hapi_far far;
-  hapi_wire_codec codec;
+  uint32_t count; /* of codecs: one for each client that there may be, or the client's own */
+  hapi_wire_codec *wires;
+  hapi_codec *codecs;
 };
+
+static void remote_discard(hapi_remote *own)
+{
+  for (uint32_t i = 0; own->wires != NULL && i < own->count; ++i) {
+    hapi_wire_codec_finish(&own->wires[i]);
+  }
+  hapi_free(own->wires);
+  hapi_free(own->codecs);
+  hapi_free(own);
+}
 
 static void remote_free(hap_session *session)
 {
-  hapi_remote *own = session->ferry.own;
-  hapi_far_finish(&own->far);
-  hapi_wire_codec_finish(&own->codec);
-  hapi_free(own);
+  hapi_far_finish(&session->ferry.own->far);
+  remote_discard(session->ferry.own);
+}
+
+/* NULL: no memory. A world has it for a client once that is there. */
+static hapi_remote *remote_make(const hapi_capacity *capacity, hapi_side side)
+{
+  bool world = side == HAPI_SIDE_WORLD;
+  hapi_remote *own = hapi_alloc(sizeof *own);
+  if (own == NULL) {
+    return NULL;
+  }
+  own->count = world ? capacity->pointers : 1;
+  own->wires = hapi_alloc_array(own->count, sizeof *own->wires);
+  own->codecs = hapi_alloc_array(own->count, sizeof *own->codecs);
+  bool good = own->wires != NULL && own->codecs != NULL;
+  for (uint32_t i = 0; i < own->count && good; ++i) {
+    hapi_wire_codec_prepare(&own->wires[i], capacity, world, &own->codecs[i]);
+    good = world || hapi_wire_codec_open(&own->wires[i]) >= HAP_OK;
+  }
+  if (!good) {
+    remote_discard(own);
+    return NULL;
+  }
+  return own;
 }
 
 static hap_status remote_check(const hap_session *session, const hap_link *link, hapi_side side)
@@ -50,23 +83,19 @@ static hap_status remote_check(const hap_session *session, const hap_link *link,
 static hap_status remote_open(hap_session *session, hap_link *link, hapi_side side)
 {
   HAPI_TRY(remote_check(session, link, side));
-  hapi_remote *own = hapi_alloc(sizeof *own);
-  hapi_codec codec;
-  bool world = side == HAPI_SIDE_WORLD;
-  const hapi_capacity *capacity = hapi_exchange_capacity(session->exchange);
-  if (own == NULL || hapi_wire_codec_init(&own->codec, capacity, world, &codec) < HAP_OK) {
-    hapi_free(own);
+  hapi_remote *own = remote_make(hapi_exchange_capacity(session->exchange), side);
+  if (own == NULL) {
     return hapi_session_fail(session, HAP_ERROR_MEMORY, "no memory for a far loop");
   }
-  const hapi_end end = {.link = link, .codec = codec};
-  own->far.world.end = own->far.loop.end = end;
+  own->far.world.end = own->far.loop.end = (hapi_end){.link = link, .codec = own->codecs[0]};
+  own->far.world.codecs = own->codecs;
+  own->far.world.room = own->count;
   hap_status status = hapi_session_set_far(session, side, &own->far);
   if (status >= HAP_OK || session->ferry.far == &own->far) {
     session->ferry.own = own;
     session->ferry.free = remote_free;
   } else {
-    hapi_wire_codec_finish(&own->codec);
-    hapi_free(own);
+    remote_discard(own);
   }
   return status;
 }
@@ -94,8 +123,7 @@ hap_status hap_session_set_client_limits(hap_session *session, double force, dou
     return hapi_session_fail(session, HAP_ERROR_STATE,
                              "limits are for a session that is served and not started");
   }
-  hapi_world_end *world = &session->ferry.own->far.world;
-  world->terms.limits = world->bound.most = (hapi_limits){force, speed};
+  hapi_world_end_limit(&session->ferry.own->far.world, &(hapi_limits){force, speed});
   return HAP_OK;
 }
 
@@ -103,11 +131,12 @@ hap_status hap_session_set_client_limits(hap_session *session, double force, dou
 
 static void world_tell(const hapi_world_end *world, hap_remote_state *out)
 {
-  out->joined = world->end.joined;
+  out->joined = world->joined;
   out->joins = world->clients;
   out->look_ahead = world->terms.look_ahead_s;
   out->bounded = world->bounded;
   out->turned_away = world->turned_away;
+  out->shared = world->shares.shared;
 }
 
 static void loop_tell(const hapi_loop_end *loop, hap_remote_state *out)
@@ -117,6 +146,7 @@ static void loop_tell(const hapi_loop_end *loop, hap_remote_state *out)
   out->look_ahead = loop->terms.look_ahead_s;
   out->turned_away = loop->turned_away;
   out->drawn = loop->agreed && loop->draws;
+  out->left_out = loop->hands.left_out;
   if (loop->stamps.count > 0) {
     int64_t trip_ns;
     out->clock_ahead_s = 1e-9 * (double)hapi_stamps_offset(&loop->stamps, &trip_ns);

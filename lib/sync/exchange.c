@@ -64,6 +64,7 @@ static const message_array arrays[] = {
     MODEL(courses_offset, course_count, hapi_model_course, bodies),
     MODEL(triangles_offset, triangle_count, hapi_triangle, triangles),
     MODEL(feels_offset, feel_count, hapi_model_feel, feels),
+    MODEL(hands_offset, hand_count, hapi_model_hand, pointers),
 #define STATE(...) ARRAY(HAPI_CHANNEL_STATE, hapi_state, __VA_ARGS__)
     STATE(bodies_offset, body_high, hapi_state_body, bodies),
     STATE(contacts_offset, contact_count, hapi_state_contact, contacts),

@@ -223,6 +223,21 @@ typedef struct hapi_model_cross {
   double a[6][3];   /* world axes, as hapi_model_contact.a */
 } hapi_model_cross;
 
+/* A hand of another loop, which the loop has to simulate with its own ones. In contacts, feels and
+ * the near message its pointer has the number capacity.pointers + number. */
+typedef struct hapi_model_hand {
+  uint32_t number;
+  uint32_t generation;
+  double radius;
+  double stiffness;
+  double damping;
+  double friction;
+  double finger_radius;
+  hap_pose pose;
+  hap_twist twist;
+  hapi_tool_hull hull; /* count 0: it is a sphere */
+} hapi_model_hand;
+
 typedef struct hapi_model {
   uint64_t number;       /* 1, 2, 3 ... */
   uint64_t tick;         /* of the hapi_state that it was made from */
@@ -252,6 +267,7 @@ typedef struct hapi_model {
   uint32_t course_count;   /* of models but CONTACT those alone that begin */
   uint32_t triangle_count; /* model CONTACT */
   uint32_t feel_count;
+  uint32_t hand_count; /* 0 where the loop is beside its world */
   uint32_t bodies_offset;
   uint32_t contacts_offset;
   uint32_t joints_offset;
@@ -260,6 +276,7 @@ typedef struct hapi_model {
   uint32_t courses_offset;
   uint32_t triangles_offset;
   uint32_t feels_offset;
+  uint32_t hands_offset;
   uint32_t watch_slot[HAP_TRACE_BODIES_MAX];      /* HAPI_SLOT_NONE: not local */
   double watch_position[HAP_TRACE_BODIES_MAX][3]; /* at state_ns */
 } hapi_model;
@@ -272,5 +289,6 @@ HAPI_MESSAGE_ARRAY(hapi_model_courses, hapi_model, hapi_model_course, courses_of
 HAPI_MESSAGE_ARRAY(hapi_model_crosses, hapi_model, hapi_model_cross, crosses_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_triangles, hapi_model, hapi_triangle, triangles_offset)
 HAPI_MESSAGE_ARRAY(hapi_model_feels, hapi_model, hapi_model_feel, feels_offset)
+HAPI_MESSAGE_ARRAY(hapi_model_hands, hapi_model, hapi_model_hand, hands_offset)
 
 #endif

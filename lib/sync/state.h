@@ -20,6 +20,8 @@ typedef struct hapi_state_pointer {
   double magnet_hold; /* N/m: a surface that pulls more steeply is cut */
   hap_pose pose;
   hap_twist twist;
+  double apart[3];      /* m, of a proxy: from it to the hand */
+  double hold;          /* N/m, of a proxy: of the hand against what it touches; else 0 */
   uint32_t is_tool;     /* a hull: see hapi_state_hulls */
   double extent;        /* m, of a hull as in hapi_near_tool, else the radius */
   uint32_t bound_count; /* bodies to which own forces are bound; the births of them: */

@@ -6,6 +6,7 @@
 #include "base/assert.h"
 #include "base/pose.h"
 #include "local/body_course.h"
+#include "local/body_draw.h"
 #include "local/body_stay.h"
 #include "local/body_step.h"
 #include "local/brace_rows.h"
@@ -472,6 +473,9 @@ static __attribute__((noinline, cold)) void proxies_begin(const hapi_pointers *p
 static void step_begin(hapi_tick *tick)
 {
   hapi_solver *solver = &tick->rows.solver;
+  if (tick->bodies.copies > 0) {
+    hapi_bodies_draw(&tick->bodies, tick->facts.period);
+  }
   bodies_begin(&tick->bodies, tick->contacts.patches, &tick->rows, &tick->facts);
   uint32_t first_hub = solver->body_count;
   if (tick->pointers.proxies) {

@@ -132,6 +132,19 @@ static uint32_t report_sides(const hapi_tool_world *w, hapi_tool_side *out)
   return count;
 }
 
+/* A proxy does not enter what it touches: for others the hand behind it does, held by both springs
+ * one after the other. */
+static void report_hand(const hapi_pointer *in, hapi_state_pointer *out)
+{
+  hapi_v3_set(out->apart, 0.0, 0.0, 0.0);
+  out->hold = 0.0;
+  if (in->proxied && in->coupling.stiffness > 0.0) {
+    double soft = in->rigid ? 0.0 : 1.0 / in->surface.stiffness;
+    hapi_v3_sub(in->handle.position, in->pose.position, out->apart);
+    out->hold = 1.0 / (1.0 / in->coupling.stiffness + soft);
+  }
+}
+
 /* The places of those that have not come yet were cleared at start. */
 static void report_pointers(const hapi_tick *tick, hapi_state *out)
 {
@@ -152,6 +165,7 @@ static void report_pointers(const hapi_tick *tick, hapi_state *out)
     pointers[i].finger_radius = in->surface.finger_radius;
     pointers[i].pose = in->pose;
     pointers[i].twist = in->twist;
+    report_hand(in, &pointers[i]);
     pointers[i].is_tool = in->shape.hull != NULL;
     pointers[i].extent = in->shape.extent;
     pointers[i].bound_count =

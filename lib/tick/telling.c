@@ -452,9 +452,10 @@ void hapi_telling_follow(hapi_telling *telling, const hapi_tick *tick, bool even
     if (at.pointer->generation == 0) {
       grab_follow(&at);
     }
-    if (at.list->generation != at.pointer->generation) {
+    uint32_t generation = at.pointer->handle.foreign ? 0 : at.pointer->generation;
+    if (at.list->generation != generation) {
       list_leave(&at);
-      at.list->generation = at.pointer->generation;
+      at.list->generation = generation;
     }
     for (uint32_t k = 0; k < at.list->count; ++k) {
       at.list->of[k].pushes = false;

@@ -22,10 +22,11 @@ static const hapi_wire_field model_fields[] = {
     /* What the lists say. */
     M(NOT, body_count), M(NOT, contact_count), M(NOT, joint_count), M(NOT, tool_count),
     M(NOT, cross_count), M(NOT, course_count), M(NOT, triangle_count), M(NOT, feel_count),
+    M(NOT, hand_count),
     /* The receiver's own. */
     M(NOT, look_ahead_s), M(NOT, bodies_offset), M(NOT, contacts_offset), M(NOT, joints_offset),
     M(NOT, tools_offset), M(NOT, crosses_offset), M(NOT, courses_offset), M(NOT, triangles_offset),
-    M(NOT, feels_offset)};
+    M(NOT, feels_offset), M(NOT, hands_offset)};
 
 static const hapi_wire_field near_fields[] = {
 #define N(kind, ...) kind(hapi_near, __VA_ARGS__)
@@ -188,6 +189,20 @@ static const hapi_wire_field tool_pair_fields[] = {
     Q(NUMBER, feel),
     Q(EXACT, reach, 1)};
 
+static const hapi_wire_field hand_fields[] = {
+#define L(kind, ...) kind(hapi_model_hand, __VA_ARGS__)
+    L(NUMBER, number),
+    L(NUMBER, generation),
+    L(EXACT, radius, 1),
+    L(EXACT, stiffness, 1),
+    L(EXACT, damping, 1),
+    L(OPEN, friction, 1),
+    L(EXACT, finger_radius, 1),
+    L(POSE, pose),
+    L(TWIST, twist),
+    L(NUMBER, hull.count),
+    L(EXACT, hull.points, 3 * HAPI_TOOL_POINTS_MAX)};
+
 static const hapi_wire_field state_fields[] = {
 #define S(kind, ...) kind(hapi_state, __VA_ARGS__)
     S(LONG, tick),
@@ -239,6 +254,8 @@ static const hapi_wire_field pointer_fields[] = {
     H(OPEN, magnet_hold, 1),
     H(POSE, pose),
     H(TWIST, twist),
+    H(FIXED, apart, 3, HAPI_WIRE_POSITION_BITS),
+    H(EXACT, hold, 1),
     H(NUMBER, is_tool),
     H(EXACT, extent, 1),
     H(NUMBER, bound_count),
@@ -322,6 +339,7 @@ const hapi_wire_record hapi_wire_records[HAPI_WIRE_KINDS] = {
     [HAPI_WIRE_TOOL] = RECORD("tool", tool_fields, hapi_near_tool, 0, true, false),
     [HAPI_WIRE_TOOL_PAIR] =
         RECORD("tool pair", tool_pair_fields, hapi_near_tool_pair, 0, true, false),
+    [HAPI_WIRE_HAND] = RECORD("hand", hand_fields, hapi_model_hand, 0, true, false),
     [HAPI_WIRE_STATE] = RECORD("state", state_fields, hapi_state, 0, false, false),
     [HAPI_WIRE_POINTER] = RECORD("pointer", pointer_fields, hapi_state_pointer, 1, true, false),
     [HAPI_WIRE_HULL] = RECORD("hull", hull_fields, hapi_tool_hull, 1, true, false),
@@ -375,6 +393,7 @@ uint32_t hapi_wire_most(hapi_wire_kind kind, const hapi_capacity *c)
     case HAPI_WIRE_PAIR:
       return c->pairs;
     case HAPI_WIRE_TOOL:
+    case HAPI_WIRE_HAND:
     case HAPI_WIRE_POINTER:
     case HAPI_WIRE_HULL:
       return c->pointers;

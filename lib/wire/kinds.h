@@ -34,16 +34,17 @@ typedef enum hapi_wire_kind {
   HAPI_WIRE_PAIR = 13,
   HAPI_WIRE_TOOL = 14,
   HAPI_WIRE_TOOL_PAIR = 15,
+  HAPI_WIRE_HAND = 16, /* of another client */
   /* client -> server */
-  HAPI_WIRE_STATE = 16,
-  HAPI_WIRE_POINTER = 17,
-  HAPI_WIRE_HULL = 18,
-  HAPI_WIRE_MOVED = 19, /* a body of the state */
-  HAPI_WIRE_TOUCH = 20, /* a contact of the state */
-  HAPI_WIRE_SPRING = 21,
-  HAPI_WIRE_GIVEN = 22, /* a joint of the state */
-  HAPI_WIRE_SIDE = 23,
-  HAPI_WIRE_KINDS = 24
+  HAPI_WIRE_STATE = 17,
+  HAPI_WIRE_POINTER = 18,
+  HAPI_WIRE_HULL = 19,
+  HAPI_WIRE_MOVED = 20, /* a body of the state */
+  HAPI_WIRE_TOUCH = 21, /* a contact of the state */
+  HAPI_WIRE_SPRING = 22,
+  HAPI_WIRE_GIVEN = 23, /* a joint of the state */
+  HAPI_WIRE_SIDE = 24,
+  HAPI_WIRE_KINDS = 25
 } hapi_wire_kind;
 
 typedef enum hapi_wire_type {

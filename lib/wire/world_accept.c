@@ -17,6 +17,7 @@ static hapi_model *model_block(const hapi_capacity *c)
   head.courses_offset = hapi_wire_block_array(&size, c->bodies, sizeof(hapi_model_course));
   head.triangles_offset = hapi_wire_block_array(&size, c->triangles, sizeof(hapi_triangle));
   head.feels_offset = hapi_wire_block_array(&size, c->feels, sizeof(hapi_model_feel));
+  head.hands_offset = hapi_wire_block_array(&size, c->pointers, sizeof(hapi_model_hand));
   hapi_model *model = hapi_alloc(size);
   if (model != NULL) {
     *model = head;
@@ -168,6 +169,12 @@ static bool body_is_there(const accepting *a, uint32_t slot)
          (slot < a->world->capacity.bodies && a->world->bodies[slot] != 0);
 }
 
+/* The client's own, or one of the hands of others. */
+static bool pointer_is_there(const accepting *a, uint32_t pointer)
+{
+  return pointer < 2 * a->world->capacity.pointers;
+}
+
 static const char *contact_accept(const accepting *a, uint32_t place)
 {
   hapi_model_contact *c = &hapi_model_contacts(a->world->model)[place];
@@ -175,7 +182,7 @@ static const char *contact_accept(const accepting *a, uint32_t place)
   c->tool = 0;
   c->told.first = c->told.count == 0 ? 0 : c->told.first;
   if (c->slot >= a->world->capacity.contacts || a->world->seen[c->slot] != 0 ||
-      c->pointer >= a->world->capacity.pointers || !body_is_there(a, c->body)) {
+      !pointer_is_there(a, c->pointer) || !body_is_there(a, c->body)) {
     return "a contact's slot, pointer or body is not there, or two have one slot";
   }
   if (c->told.first > a->world->model->triangle_count ||
@@ -250,6 +257,7 @@ static void counts_take(const accepting *a)
   model->course_count = counts[HAPI_WIRE_COURSE];
   model->triangle_count = counts[HAPI_WIRE_TRIANGLE];
   model->feel_count = counts[HAPI_WIRE_FEEL];
+  model->hand_count = counts[HAPI_WIRE_HAND];
   model->tool_count = model->cross_count = 0;
   near->body_count = counts[HAPI_WIRE_PLACED];
   near->geom_count = counts[HAPI_WIRE_GEOM];
@@ -276,9 +284,22 @@ static const char *feel_accept(const accepting *a, uint32_t place)
   hapi_model_feel *f = &hapi_model_feels(a->world->model)[place];
   memset(f, 0, sizeof *f);
   world_unpack(a, HAPI_WIRE_FEEL, place, f);
-  return f->pointer >= a->world->capacity.pointers || (f->feel.more & HAPI_FEEL_TEXTURE) != 0
+  return !pointer_is_there(a, f->pointer) || (f->feel.more & HAPI_FEEL_TEXTURE) != 0
              ? "how a pointer feels a geom is out of range"
              : NULL;
+}
+
+static const char *hand_accept(const accepting *a, uint32_t place)
+{
+  hapi_model_hand *h = &hapi_model_hands(a->world->model)[place];
+  world_unpack(a, HAPI_WIRE_HAND, place, h);
+  bool good = h->number < a->world->capacity.pointers && h->generation != 0 && h->radius >= 0.0 &&
+              h->stiffness > 0.0 && h->damping >= 0.0 && h->friction >= 0.0 &&
+              h->finger_radius >= 0.0 && h->hull.count <= HAPI_TOOL_POINTS_MAX;
+  for (uint32_t i = 0; i < place && good; ++i) {
+    good = hapi_model_hands(a->world->model)[i].number != h->number;
+  }
+  return good ? NULL : "the hand of another client is out of range, or two have one number";
 }
 
 static const char *model_accept(const accepting *a)
@@ -301,6 +322,9 @@ static const char *model_accept(const accepting *a)
   }
   for (uint32_t i = 0; i < w->model->feel_count && bad == NULL; ++i) {
     bad = feel_accept(a, i);
+  }
+  for (uint32_t i = 0; i < w->model->hand_count && bad == NULL; ++i) {
+    bad = hand_accept(a, i);
   }
   return bad;
 }
@@ -366,7 +390,7 @@ static const char *tool_accept(const accepting *a, uint32_t place)
 {
   hapi_near_tool *tool = &hapi_near_tools(a->world->near)[place];
   world_unpack(a, HAPI_WIRE_TOOL, place, tool);
-  return tool->pointer < a->world->capacity.pointers && tool->hull.count > 0 &&
+  return pointer_is_there(a, tool->pointer) && tool->hull.count > 0 &&
                  tool->hull.count <= HAPI_TOOL_POINTS_MAX && tool->radius >= 0.0 &&
                  tool->extent >= 0.0
              ? NULL
@@ -431,6 +455,7 @@ static void model_give(hapi_model *from, hapi_model *out)
   head.courses_offset = out->courses_offset;
   head.triangles_offset = out->triangles_offset;
   head.feels_offset = out->feels_offset;
+  head.hands_offset = out->hands_offset;
   *out = head;
 #define GIVE(array, count) \
   hapi_wire_block_copy(array(out), array(from), from->count, sizeof *array(out))
@@ -440,6 +465,7 @@ static void model_give(hapi_model *from, hapi_model *out)
   GIVE(hapi_model_courses, course_count);
   GIVE(hapi_model_triangles, triangle_count);
   GIVE(hapi_model_feels, feel_count);
+  GIVE(hapi_model_hands, hand_count);
 }
 
 static void near_give(hapi_near *from, hapi_near *out)

@@ -134,6 +134,16 @@ static void pack_joints(packing *p, hapi_model *model)
   }
 }
 
+static void pack_hands(packing *p, hapi_model *model)
+{
+  for (uint32_t i = 0; i < model->hand_count; ++i) {
+    const hapi_model_hand *hand = &hapi_model_hands(model)[i];
+    uint64_t key = hapi_hash_word(HAPI_HASH_BEGIN, key_of(hand->number, hand->generation));
+    key = hapi_hash_doubles(key, hand->hull.points[0], 3 * HAPI_TOOL_POINTS_MAX);
+    (void)pack_add(p, HAPI_WIRE_HAND, key, hand);
+  }
+}
+
 static void pack_model(packing *p, hapi_model *model)
 {
   (void)pack_add(p, HAPI_WIRE_MODEL, 0, model);
@@ -146,6 +156,7 @@ static void pack_model(packing *p, hapi_model *model)
     (void)pack_add(p, HAPI_WIRE_CONTACT, key_of(contact->slot, contact->generation), contact);
   }
   pack_joints(p, model);
+  pack_hands(p, model);
   for (uint32_t i = 0; i < model->feel_count; ++i) {
     const hapi_model_feel *feel = &hapi_model_feels(model)[i];
     (void)pack_add(p, HAPI_WIRE_FEEL, feel->number, feel);
