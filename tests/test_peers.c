@@ -221,7 +221,7 @@ TEST(boxes_sleep_where_they_may)
 
 #define COLUMNS                                                                             \
   "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode,iterations," \
-  "peak_n,rest_mm,asleep,repeats,haptic_hz,tick_us,contact_us,physics_us\n"
+  "peak_n,rest_mm,asleep,repeats,haptic_hz,tick_us,contact_us,physics_us,truth_floor\n"
 
 TEST(the_program_leaves_its_table)
 {
@@ -241,6 +241,22 @@ TEST(the_program_leaves_its_table)
     CHECK(said_lines(peer_missing_at(i)) == 1);
   }
   CHECK(file_exists(folder_path("peers_trace.csv")));
+}
+
+/* Four cubes in a row on a floor: their force is known. */
+TEST(a_truth_tells_its_floor)
+{
+  folder_clear();
+  REQUIRE(run("peers --quick --scene row:4 --only engine=ode --out %s", test_folder) == 0);
+  const char *row = strstr(file_text(folder_path("peers.csv")), "ode,row,4,");
+  REQUIRE(row != NULL && strchr(row, '\n') != NULL);
+  const char *end = strchr(row, '\n');
+  while (*end != ',') {
+    --end;
+  }
+  char *rest;
+  const double floor = strtod(end + 1, &rest);
+  CHECK(rest > end + 1 && floor > 0.0 && floor < 1e-3);
 }
 
 /* The first force is that of 1 kHz: spring and damper of the hand do not know of ticks. */

@@ -426,7 +426,8 @@ static bool belt_surface(void *user, dGeomID a, dGeomID b, dSurfaceParameters *i
 TEST(what_a_conveyor_takes_along_is_within_the_bound)
 {
   server *s = server_open_with(belt_surface);
-  s->far.world.guests[0].bound.most = (hapi_limits){2.0, 1.0};
+  const hapi_limits weak = {2.0, 1.0};
+  hapi_world_end_limit(&s->far.world, &weak);
   client *c = client_open(s, "hand", 1000.0, 8);
   dBodyID boxes[3];
   for (int i = 0; i < 3; ++i) {

@@ -169,6 +169,7 @@ void hapi_poses_tell(hapi_drawing *drawing, const hapi_body_table *table, uint32
           (hapi_told_body){.name = known->rest->name,
                            .birth = known->rest->birth,
                            .owned = known->loop_owned,
+                           .slot = known->slot,
                            .pose = *pose_in(drawing, drawn, drawing->frames.count - 1)};
     }
   }

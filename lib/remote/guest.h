@@ -8,6 +8,7 @@
 
 #include "remote/bound.h"
 #include "remote/end.h"
+#include "remote/scenery.h"
 #include "remote/shares.h"
 #include "sync/exchange.h"
 
@@ -31,9 +32,9 @@ typedef struct hapi_guest_hand {
 typedef struct hapi_guest {
   hapi_end end; /* of a client; joined: also of the world's own loop */
   hapi_bound bound;
+  bool admitted; /* the client has told its terms, and they fit */
+  bool draws;    /* it wants to know where bodies are that it does not move */
   hapi_scenery scenery;
-  bool draws;     /* it wants to hear of all bodies */
-  bool admitted;  /* the client has told its terms, and they fit */
   bool fresh;     /* the state has come since the last one was made for physics */
   bool has_state; /* *state is what it told last, as far as it may */
   bool leaves;    /* it has gone: its state is its last one */

@@ -88,7 +88,6 @@ static void bodies_begin(const hapi_shares *shares, hapi_model *model)
     hapi_share *share = &shares->of[body->slot];
     if (share->generation != body->generation) {
       share->generation = body->generation;
-      share->birth = body->birth;
       share->of = share->before = HAPI_GUEST_NONE;
     }
     share->there = (body->flags & HAPI_BODY_DRIVEN) == 0;

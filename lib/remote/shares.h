@@ -21,16 +21,15 @@
 /* Of the body of a slot. */
 typedef struct hapi_share {
   uint32_t generation; /* 0: no model had the slot */
-  uint64_t birth;
-  uint64_t since;   /* the model with which that loop came to move it */
-  uint32_t link;    /* scratch: another body of the island, or itself */
-  uint32_t hands;   /* of the island, in the newest model: set of guests */
-  uint8_t of;       /* whose loop moves it */
-  uint8_t before;   /* the guest that moved it up to the newest model; HAPI_GUEST_NONE: none */
-  uint8_t chosen;   /* scratch, of an island: who shall move it */
-  uint32_t holders; /* of the island: set of guests whose hands hold a body of it */
-  bool there;       /* in the newest model, and not driven */
-  bool wanted;      /* scratch: goes to the guest */
+  uint64_t since;      /* the model with which that loop came to move it */
+  uint32_t link;       /* scratch: another body of the island, or itself */
+  uint32_t hands;      /* of the island, in the newest model: set of guests */
+  uint8_t of;          /* whose loop moves it */
+  uint8_t before;      /* the guest that moved it up to the newest model; HAPI_GUEST_NONE: none */
+  uint8_t chosen;      /* scratch, of an island: who shall move it */
+  uint32_t holders;    /* of the island: set of guests whose hands hold a body of it */
+  bool there;          /* in the newest model, and not driven */
+  bool wanted;         /* scratch: goes to the guest */
 } hapi_share;
 
 /* A hand in the world, by its number there. */

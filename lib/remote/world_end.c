@@ -239,13 +239,11 @@ static void message_take(hapi_world_end *world, const hap_link_event *event)
   hap_detail why = {""};
   bool known;
   hapi_guest *guest = guest_find(world, event->peer, &known);
-  if (guest == NULL && known) {
-    ++world->end.refused; /* it was told to go: why, stays to be read */
-  } else if (guest == NULL) {
+  if (guest == NULL && !known) {
     snprintf(why.text, sizeof why.text, "it is of peer %u, who has no part here", event->peer);
     hapi_end_refuse(&world->end, &why);
-  } else if (guest->taken++ >= TAKEN_MOST) {
-    ++world->end.refused;
+  } else if (guest == NULL || guest->taken++ >= TAKEN_MOST) {
+    ++world->end.refused; /* told to go, or too much: why, stays to be read */
   } else if (event->channel == HAPI_TERMS_CHANNEL) {
     client_admit(world, guest, event);
   } else if (event->channel == HAPI_STAMPS_CHANNEL) {
@@ -513,12 +511,11 @@ static void guest_send(const hapi_world_end *world, hapi_guest *guest, hapi_mode
   hapi_end_send(&guest->end, messages);
 }
 
-/* ---- what is drawn ---- */
+/* ---- bodies that a client draws ---- */
 
-/* Bodies as a guest is told of them. */
 typedef struct guest_view {
   const hapi_world_end *world;
-  uint8_t guest;
+  uint8_t number;
 } guest_view;
 
 static uint32_t view_places(void *of)
@@ -527,29 +524,23 @@ static uint32_t view_places(void *of)
   return view->world->bodies.places(view->world->bodies.of);
 }
 
-/* A loop tells itself of what it moves, and of nothing that another one moves. */
+/* What its own loop moves a client knows better; bodies of other loops it is told. */
 static void view_read(void *of, uint32_t first, uint32_t count, hapi_told_body *out)
 {
   const guest_view *view = of;
-  const hapi_shares *shares = &view->world->shares;
   view->world->bodies.read(view->world->bodies.of, first, count, out);
   for (uint32_t i = 0; i < count; ++i) {
-    bool moves = false;
-    for (uint32_t k = 0; k < shares->body_count && out[i].owned && !moves; ++k) {
-      moves = shares->of[k].birth == out[i].birth && hapi_shares_moves(shares, view->guest, k);
-    }
-    out[i].owned = moves;
+    out[i].owned = out[i].owned && out[i].slot < view->world->shares.body_count &&
+                   hapi_shares_moves(&view->world->shares, view->number, out[i].slot);
   }
 }
 
-static void guest_draw(const hapi_world_end *world, hapi_guest *guest)
+static void guest_show(hapi_world_end *world, hapi_guest *guest)
 {
   guest_view view = {world, guest_number(world, guest)};
-  const hapi_scenery_source source = {&view, view_places, view_read};
+  const hapi_scenery_source from = {&view, view_places, view_read};
   const hapi_scenery_out out = {&guest->end, hapi_end_send_scenery};
-  if (guest->draws && world->bodies.read != NULL) {
-    (void)hapi_scenery_step(&guest->scenery, &source, &out); /* without memory: later */
-  }
+  (void)hapi_scenery_step(&guest->scenery, &from, &out); /* without memory: later */
 }
 
 static void loop_send(hapi_world_end *world, hapi_model *model, hapi_near *near)
@@ -578,7 +569,9 @@ void hapi_world_end_send(hapi_world_end *world, int64_t now_ns)
     guest->end.now_ns = now_ns;
     if (guest->end.joined) {
       guest_send(world, guest, model, near);
-      guest_draw(world, guest);
+    }
+    if (guest->end.joined && guest->draws && world->bodies.read != NULL) {
+      guest_show(world, guest);
     }
   }
   if (world->loop != NULL && world->wake == NULL) {

@@ -145,7 +145,7 @@ typedef struct hapi_far {
  * Errors as above, and HAP_ERROR_MEMORY. */
 hap_status hapi_session_set_far(hap_session *session, hapi_side side, hapi_far *far);
 void hapi_far_finish(hapi_far *far); /* begun before */
-/* session_pointer.c: what a pointer can do to a world. */
+/* What a pointer can do to a world. */
 hapi_limits hapi_session_limits_of(const hapi_pointer_setup *setup);
 /* [any] The pointers together can do so much more, in force that may be less than 0; a world far
  * away is told. */

@@ -130,7 +130,6 @@ void hapi_session_allow(hap_session *session, const hapi_limits *more)
   }
 }
 
-/* Hands of other sessions come as pointers, too, in another thread. */
 static hap_status hand_add(hap_session *session, const hapi_pointer_setup *setup,
                            hap_pointer_id *out, hap_detail *detail)
 {

@@ -145,8 +145,8 @@ static void loop_tell(const hapi_loop_end *loop, hap_remote_state *out)
   out->joins = loop->number > 0 || loop->agreed;
   out->look_ahead = loop->terms.look_ahead_s;
   out->turned_away = loop->turned_away;
-  out->left_out = loop->hands.left_out;
   out->drawn = loop->agreed && loop->draws;
+  out->left_out = loop->hands.left_out;
   if (loop->stamps.count > 0) {
     int64_t trip_ns;
     out->clock_ahead_s = 1e-9 * (double)hapi_stamps_offset(&loop->stamps, &trip_ns);

@@ -87,11 +87,11 @@ enum {
   HAPI_BODY_WHOLE = 128,
   /* Of one outside of the range: the world beyond it takes up some of the loop's push. */
   HAPI_BODY_BRACED = 512,
-  /* It has been at rest for a while: its velocity is what a solver leaves, which rocks it. */
-  HAPI_BODY_STILL = 1024,
   /* Of an OWNED one: a copy of what another loop moves. It is drawn to what that tells, and nothing
    * is told of it. */
-  HAPI_BODY_SHARED = 2048
+  HAPI_BODY_SHARED = 1024,
+  /* It has been at rest for a while: its velocity is what a solver leaves, which rocks it. */
+  HAPI_BODY_STILL = 2048
 };
 
 /* A slower body gets no gyroscopic term, which would change its rotation in a tick by a

@@ -13,6 +13,7 @@ typedef struct hapi_told_body {
   uint64_t name;  /* of equal worlds the same; stays for the body's life; 0: there is none */
   uint64_t birth; /* in messages to the loop; another one after the body was put elsewhere */
   bool owned;     /* the loop moves it, and knows it better */
+  uint32_t slot;  /* in models; UINT32_MAX: none */
   hap_pose pose;
 } hapi_told_body;
 
