@@ -32,8 +32,9 @@ static hapi_model_body *box_add(double mass)
   return body;
 }
 
-/* The four lower corners of the box on the floor, whose face is fixed. */
-static void floor_adopt(double mu)
+/* The four lower corners of the box on the floor, whose face is fixed. The message is written where
+ * the one before was, as by a contact thread that has it back. */
+static void contacts_adopt(double mu, uint64_t first_number)
 {
   hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
   patches->contact_count = 4;
@@ -44,6 +45,7 @@ static void floor_adopt(double mu)
     hapi_patch_contact *c = &hapi_patches_contacts(patches)[i];
     memset(c, 0, sizeof *c);
     c->key = 1;
+    c->number = first_number > 0 ? first_number + (uint64_t)i : 0;
     c->generation_a = 1;
     c->body_b = HAPI_SLOT_NONE;
     c->touch = HAPI_TOUCH_FACE_B;
@@ -59,6 +61,12 @@ static void floor_adopt(double mu)
                       .erp = 0.2,
                       .max_push = HUGE_VAL};
   hapi_tick_adopt_patches(&f.tick, patches);
+}
+
+/* New contacts, whatever was before. */
+static void floor_adopt(double mu)
+{
+  contacts_adopt(mu, 0);
 }
 
 /* Height of a corner of the box, of a unit quaternion: the third row of its matrix. */
@@ -173,6 +181,22 @@ TEST(another_mass_or_friction_makes_rows_anew)
   floor_adopt(0.2);
   ticks_run(1);
   CHECK_NEAR(f.rows[1].mu, 0.2, 0.0);
+}
+
+TEST(the_same_contact_with_another_friction_has_rows_anew)
+{
+  box_rest();
+  contacts_adopt(0.5, 7);
+  ticks_run(2);
+  const uint64_t made = f.rows[0].made;
+  contacts_adopt(0.5, 7);
+  ticks_run(2);
+  CHECK(f.rows[0].made == made); /* the rows went on */
+  contacts_adopt(0.2, 7);
+  ticks_run(1);
+  CHECK(f.rows[0].made != made);
+  CHECK_NEAR(f.rows[1].mu, 0.2, 0.0);
+  CHECK_NEAR(load_on_floor(), 9.81 * MASS, 1e-6); /* from the impulses that it had */
 }
 
 /* The rows of pointers come first: contacts move up and down the list as a pointer comes and

@@ -2,9 +2,11 @@
  * SPDX-License-Identifier: MIT */
 #include "local/contact_memory.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/hash.h"
 #include "base/vec.h"
 
 /* New contacts between bodies take over the impulses of the old ones: the solver starts from them,
@@ -56,24 +58,30 @@ static uint32_t first_of(const hapi_body_contacts *contacts, uint64_t key, uint3
   return count;
 }
 
+static uint64_t surface_hash(const hapi_surface *surface)
+{
+  uint64_t words[sizeof *surface / sizeof(uint64_t)];
+  uint64_t hash = HAPI_HASH_BEGIN;
+  static_assert(sizeof words == sizeof *surface, "all of it");
+  memcpy(words, surface, sizeof words);
+  for (size_t i = 0; i < sizeof words / sizeof words[0]; ++i) {
+    hash = hapi_hash_word(hash, words[i]);
+  }
+  return hash;
+}
+
 /* A contact at the place where it was in the message before keeps its rows as well, if its surface
  * is the same. False: it is another one. */
-static bool memory_goes_on(const hapi_body_contacts *contacts, hapi_patches *before, uint32_t index,
+static bool memory_goes_on(hapi_contact_memory *old, const hapi_patch_contact *in, uint64_t surface,
                            hapi_contact_memory *memory)
 {
-  hapi_patches *now = contacts->patches;
-  const hapi_patch_contact *in = &hapi_patches_contacts(now)[index];
-  hapi_contact_memory *old = &contacts->old_memory[index];
-  if (before == NULL || index >= before->contact_count || old->number != in->number ||
-      in->number == 0) {
+  if (old->number != in->number || in->number == 0) {
     return false;
   }
-  const hapi_surface *was =
-      &hapi_patches_surfaces(before)[hapi_patches_contacts(before)[index].surface];
-  const hapi_surface *is = &hapi_patches_surfaces(now)[in->surface];
   *memory = *old;
   memory->kept.surface = in->surface;
-  if (memcmp(was, is, sizeof *is) != 0) {
+  if (old->surface != surface) {
+    memory->surface = surface;
     memory->kept.what = HAPI_KEPT_NOTHING;
   }
   hapi_v3_set(old->core_a, HUGE_VAL, HUGE_VAL, HUGE_VAL);
@@ -103,8 +111,7 @@ static void memory_match(hapi_body_contacts *contacts, hapi_contact_memory *memo
 
 void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches)
 {
-  hapi_patches *before = contacts->patches;
-  uint32_t old_count = before != NULL ? contacts->memory_count : 0;
+  uint32_t old_count = contacts->patches != NULL ? contacts->memory_count : 0;
   hapi_contact_memory *old = contacts->memory;
   bool indexed = false;
   contacts->memory = contacts->old_memory;
@@ -112,9 +119,13 @@ void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patche
   contacts->patches = patches;
   contacts->memory_count = patches->contact_count;
   const hapi_patch_contact *in = hapi_patches_contacts(patches);
+  uint64_t surface = 0;
   for (uint32_t i = 0; i < patches->contact_count; ++i) {
     hapi_contact_memory *memory = &contacts->memory[i];
-    if (memory_goes_on(contacts, before, i, memory)) {
+    if (i == 0 || in[i].surface != in[i - 1].surface) {
+      surface = surface_hash(&hapi_patches_surfaces(patches)[in[i].surface]);
+    }
+    if (i < old_count && memory_goes_on(&old[i], &in[i], surface, memory)) {
       continue;
     }
     if (!indexed) {
@@ -124,6 +135,7 @@ void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patche
     memset(memory, 0, sizeof *memory);
     memory->key = in[i].key;
     memory->number = in[i].number;
+    memory->surface = surface;
     hapi_v3_copy(in[i].core_a, memory->core_a);
     memory_match(contacts, memory, old_count);
   }

@@ -35,7 +35,8 @@ typedef struct hapi_contact_kept {
 /* What is kept of a contact from tick to tick, and from one set of patches to the next. */
 typedef struct hapi_contact_memory {
   uint64_t key;
-  uint64_t number; /* see hapi_patch_contact */
+  uint64_t number;  /* see hapi_patch_contact */
+  uint64_t surface; /* hash of it: the message before is not ours any more */
   double core_a[3];
   double impulse[3]; /* N s: normal, friction 1 and 2 */
   hapi_contact_kept kept;
@@ -53,7 +54,8 @@ typedef struct hapi_body_contacts {
   uint64_t rowed_tick;   /* the last one in which rows were made */
 } hapi_body_contacts;
 
-/* The set stays in use, and must stay as it is, until the next call. */
+/* The set stays in use, and must stay as it is, until the next call. The one before is not looked
+ * at. */
 void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches);
 
 #endif
