@@ -30,9 +30,11 @@ hap_status hapi_world_end_begin(hapi_world_end *world)
   bool shares = hapi_shares_create(&world->shares, capacity);
   bool merge = hapi_merge_create(&world->merge, capacity);
   bool hands = hapi_hands_create(&world->hands, capacity);
+  hapi_capacity cut = *capacity;
+  cut.trail_rows = cut.path_rows = 0;
   world->shares.loop = world->loop != NULL ? (uint8_t)world->room : HAPI_GUEST_NONE;
   if (world->guests == NULL || world->contact_guests == NULL || !shares || !merge || !hands ||
-      hapi_exchange_create(capacity, &world->cut) < HAP_OK) {
+      hapi_exchange_create_late(&cut, &world->cut) < HAP_OK) {
     return HAP_ERROR_MEMORY;
   }
   hap_status status = HAP_OK;

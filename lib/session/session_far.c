@@ -34,7 +34,7 @@ hap_status hapi_session_set_ferry(hap_session *session, const hapi_ferry *ferry)
   hapi_exchange *exchange = session->ferry.exchange;
   bool apart = ferry->side == HAPI_SIDE_BOTH || ferry->has_loop;
   if (exchange == NULL && apart &&
-      hapi_exchange_create(hapi_exchange_capacity(session->exchange), &exchange) < HAP_OK) {
+      hapi_exchange_create_late(hapi_exchange_capacity(session->exchange), &exchange) < HAP_OK) {
     return hapi_session_fail(session, HAP_ERROR_MEMORY, "no memory for the messages of physics");
   }
   if (exchange != NULL) {

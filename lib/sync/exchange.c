@@ -27,6 +27,7 @@ struct hapi_exchange {
   hapi_trail trail;
   hapi_path path;
   size_t size;
+  bool late;       /* pages come with their use */
   sem_t near_bell; /* rung when there is something to find again */
   _Atomic int near_is_empty;
 };
@@ -139,20 +140,21 @@ static bool message_fits(hapi_channel name, const void *message, const hapi_capa
 
 /* ---- life ---- */
 
-hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **out)
+static hap_status exchange_make(const hapi_capacity *capacity, bool late, hapi_exchange **out)
 {
   size_t size = round_up(sizeof(hapi_exchange));
   for (int i = 0; i < HAPI_CHANNELS; ++i) {
     size += 3 * message_lay_out((hapi_channel)i, NULL, capacity);
   }
   *out = NULL;
-  char *memory = hapi_alloc(size);
+  char *memory = late ? hapi_alloc_late(1, size) : hapi_alloc(size);
   if (memory == NULL) {
     return HAP_ERROR_MEMORY;
   }
   hapi_exchange *e = (hapi_exchange *)(void *)memory;
   e->capacity = *capacity;
   e->size = size;
+  e->late = late;
   sem_init(&e->near_bell, 0, 0);
   char *at = memory + round_up(sizeof(hapi_exchange));
   for (int i = 0; i < HAPI_CHANNELS; ++i) {
@@ -177,6 +179,16 @@ hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **o
   return HAP_OK;
 }
 
+hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **out)
+{
+  return exchange_make(capacity, false, out);
+}
+
+hap_status hapi_exchange_create_late(const hapi_capacity *capacity, hapi_exchange **out)
+{
+  return exchange_make(capacity, true, out);
+}
+
 void hapi_exchange_destroy(hapi_exchange *exchange)
 {
   for (int i = 0; exchange != NULL && i < HAPI_CHANNELS; ++i) {
@@ -198,7 +210,7 @@ void hapi_exchange_reset(hapi_exchange *exchange)
     c->published = 0;
     for (int k = 0; k < 3; ++k) {
       c->numbers[k] = 0;
-      memset(c->places[k], 0, c->size);
+      memset(c->places[k], 0, exchange->late ? head_sizes[i] : c->size);
       (void)message_lay_out((hapi_channel)i, c->places[k], &exchange->capacity);
     }
   }

@@ -27,6 +27,8 @@ typedef enum hapi_channel {
 } hapi_channel;
 
 hap_status hapi_exchange_create(const hapi_capacity *capacity, hapi_exchange **out);
+/* Of memory that comes with its use: not for the haptic thread. */
+hap_status hapi_exchange_create_late(const hapi_capacity *capacity, hapi_exchange **out);
 void hapi_exchange_destroy(hapi_exchange *exchange); /* NULL allowed */
 
 /* Forgets all messages; no thread may be using the exchange. */
