@@ -153,6 +153,54 @@ TEST(a_hand_that_comes_near_and_goes_is_not_felt)
   }
 }
 
+#define BESIDE_TICKS 4000
+
+/* Hand 0 pushes the cube 4 cm along and back off it, while the other one is so near that the cube
+ * is shared from 50 ms on, and does nothing. out: force of hand 0. */
+static void push_beside_idle(double delay, double out[BESIDE_TICKS][3])
+{
+  hap_pointer_def hand;
+  hap_pointer_def_init(&hand, sizeof hand);
+  hand.radius = RADIUS;
+  hand.stiffness = STIFFNESS;
+  hand.damping = 50.0; /* it does not bounce along */
+  pair_run *run = run_with(delay, &hand);
+  for (int i = 0; i < BESIDE_TICKS; ++i) {
+    const double s = fmin(fmax(1e-3 * (i - 1500) / 2.0, 0.0), 1.0); /* of the way */
+    const double x = -0.02 + 0.03 * (1.0 - cos(2.0 * M_PI * s));
+    const double v = s > 0.0 && s < 1.0 ? 0.03 * M_PI * sin(2.0 * M_PI * s) : 0.0;
+    rig_put(run->rig, 0, AT(x - 0.5 * EDGE - RADIUS, 0.0, 0.5 * EDGE), AT(v, 0.0, 0.0));
+    rig_put(run->rig, 1, AT(0.3, 0.0, 0.5 * EDGE), AT(0.0, 0.0, 0.0));
+    rig_tick(run->rig);
+    rig_feel(run->rig, 0, out[i]);
+  }
+  CHECK(delay < 0.0 || rig_state(run->rig->session).shared == (delay >= 0.05));
+  tap_release(run->rig);
+  tap_release(run);
+}
+
+TEST(a_hand_beside_an_idle_one_feels_nearly_what_it_feels_in_the_world)
+{
+  static const double delays[] = {0.0, 0.01, 0.05, 0.1};
+  static double felt[BESIDE_TICKS][3];
+  static double here[BESIDE_TICKS][3];
+  push_beside_idle(-1.0, here);
+  for (int d = 0; d < 4; ++d) {
+    double off = 0.0;
+    double all = 0.0;
+    push_beside_idle(delays[d], felt);
+    for (int i = 0; i < BESIDE_TICKS; ++i) {
+      double apart[3];
+      hapi_v3_sub(felt[i], here[i], apart);
+      off += hapi_v3_dot(apart, apart);
+      all += hapi_v3_dot(here[i], here[i]);
+    }
+    printf("# %3.0f ms: %.4f off, RMS %.2f N\n", 1e3 * delays[d], sqrt(off / all),
+           sqrt(all / BESIDE_TICKS));
+    CHECK(sqrt(off / all) <= (delays[d] >= 0.05 ? 0.15 : 1e-3));
+  }
+}
+
 /* An application hears of its own pointer alone. */
 TEST(touches_of_another_session_s_hand_are_not_told)
 {
