@@ -316,8 +316,9 @@ TEST(hands_that_come_and_go_in_a_pile_do_no_harm)
   r->def.max_contacts = 512;
   dCreatePlane(r->space, 0.0, 0.0, 1.0, 0.0);
   for (int i = 0; i < 8; ++i) {
+    const int layer = i / 4;
     bodies[i] = ode_box(r->world, r->space, 0.2 + 0.1 * i, AT(0.06, 0.06, 0.06),
-                        AT(0.07 * (i % 4), 0.03 * (i / 4), 0.031 + 0.061 * (i / 4)));
+                        AT(0.07 * (i % 4), 0.03 * layer, 0.031 + 0.061 * layer));
   }
   dJointID hinge = dJointCreateHinge(r->world, NULL);
   dJointAttach(hinge, bodies[0], bodies[1]);
