@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include "remote/merge.h"
 #include "tests/hands_rig.h"
 
 #define SECONDS 3.0
@@ -227,4 +228,61 @@ TEST(two_hands_of_one_name_cannot_be)
   CHECK(hap_link_local_connect(r->link, "hand", NULL, NULL, &links[1], &why) == HAP_ERROR_STATE);
   CHECK(strstr(why.text, "hand") != NULL);
   hap_link_close(links[0]);
+}
+
+/* ---- totals ---- */
+
+/* The guest's loop has given so much to the body of slot 0 since it came. */
+static void guest_gives(hapi_merge_from *from, uint32_t which, hapi_exchange *exchange,
+                        double impulse, double hand_impulse)
+{
+  hapi_state *told = hapi_exchange_state_back(exchange);
+  hapi_guest *guest = &from->guests[which];
+  guest->bodies[0].generation = 1;
+  told->body_high = 1;
+  hapi_state_bodies(told)[0] = (hapi_state_body){.generation = 1, .impulse = {impulse}};
+  told->hand_impulse[0] = hand_impulse;
+  from->shares->of[0].of = (uint8_t)which;
+  hapi_guest_take(guest, 0, told, hapi_exchange_message_size(exchange, HAPI_CHANNEL_STATE),
+                  from->shares->of, (uint8_t)which);
+}
+
+/* Physics takes differences of totals: a total that falls as a loop goes would push bodies back. */
+TEST(what_a_loop_gave_stays_given_when_it_goes)
+{
+  const hapi_capacity capacity = {.bodies = 2, .contacts = 2, .pointers = 2};
+  static const uint8_t contact_guests[2];
+  hapi_exchange *exchange;
+  hapi_exchange *out;
+  hapi_shares shares = {0};
+  hapi_merge merge = {0};
+  hapi_guest guests[2] = {{.taken = 0}};
+  REQUIRE(hapi_exchange_create(&capacity, &exchange) == HAP_OK);
+  REQUIRE(hapi_exchange_create(&capacity, &out) == HAP_OK);
+  REQUIRE(hapi_shares_create(&shares, &capacity) && hapi_merge_create(&merge, &capacity));
+  hapi_merge_from from = {
+      .shares = &shares, .guests = guests, .count = 2, .contact_guests = contact_guests};
+  for (int i = 0; i < 2; ++i) {
+    REQUIRE(hapi_guest_create(&guests[i], exchange, 0.1) == HAP_OK);
+  }
+  shares.of[0].generation = 1;
+  hapi_state *sum = hapi_exchange_state_back(out);
+  guest_gives(&from, 0, exchange, 1.0, 3.0);
+  REQUIRE(hapi_merge_make(&merge, &from, sum, &capacity));
+  CHECK_NEAR(hapi_state_bodies(sum)[0].impulse[0], 1.0, 0.0);
+  guests[0].fresh = false;
+  hapi_merge_leave(&merge, &shares, &guests[0]);
+  hapi_shares_leave(&shares, 0);
+  hapi_guest_begin(&guests[0], 0, &capacity);
+  guest_gives(&from, 1, exchange, 0.25, 0.5);
+  REQUIRE(hapi_merge_make(&merge, &from, sum, &capacity));
+  CHECK_NEAR(hapi_state_bodies(sum)[0].impulse[0], 1.25, 0.0);
+  CHECK_NEAR(sum->hand_impulse[0], 3.5, 0.0);
+  for (int i = 0; i < 2; ++i) {
+    hapi_guest_finish(&guests[i]);
+  }
+  hapi_merge_finish(&merge);
+  hapi_shares_finish(&shares);
+  hapi_exchange_destroy(exchange);
+  hapi_exchange_destroy(out);
 }
