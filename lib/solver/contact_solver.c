@@ -28,6 +28,8 @@
 #define DIRECT_SWEEPS 10u
 #define PACKED_SWEEPS 12u /* where contacts are in packs, not before so many */
 #define RATE_MOST 0.99    /* of sweeps that lead nowhere */
+#define PAIRS_EACH 4u     /* sweeps, of steps of all pairs */
+#define PAIRS_FALL 0.25   /* of what sweeps correct, from one such step to the next */
 
 /* ---- preparation ---- */
 
@@ -696,6 +698,15 @@ static bool sweeps_suffice(const hapi_solver *solver, double rate)
          share * share * solver->corrected < solver->coarse;
 }
 
+/* Pairs of bodies are solved all at once (aggregate.h) from the second sweep on, before each
+ * fourth, while that takes what sweeps correct to a quarter. */
+static bool pairs_are_due(const hapi_solver *solver, double corrected)
+{
+  const hapi_aggregate *all = solver->packs.aggregate;
+  return solver->packs.in_use && all != NULL && all->count > 0 && solver->sweeps >= 2 &&
+         (solver->sweeps - 2) % PAIRS_EACH == 0 && solver->corrected < PAIRS_FALL * corrected;
+}
+
 /* It goes by rows. */
 static uint32_t direct_run(hapi_solver *solver, uint32_t budget)
 {
@@ -739,6 +750,7 @@ void hapi_solver_run(hapi_solver *solver)
   uint32_t cost = sweep_cost(solver);
   uint32_t direct_from = solver->packs.in_use ? PACKED_SWEEPS : 2; /* sweeps */
   double before[2] = {0.0, 0.0}; /* corrected, after the last sweep and the one before */
+  double at_pairs = HUGE_VAL;    /* corrected, before the last step of all pairs */
   for (uint32_t rounds = 0; rows > 0;) {
     if (ahead && solver->sweeps >= 2) {
       updates_spend(solver, &left, cost / 4);
@@ -756,6 +768,13 @@ void hapi_solver_run(hapi_solver *solver)
     if (is_settled(solver) ||
         (solver->sweeps >= 2 && (left < cost || solver->sweeps == solver->max_sweeps))) {
       break;
+    }
+    if (pairs_are_due(solver, at_pairs)) {
+      at_pairs = solver->corrected;
+      (void)hapi_aggregate_step(&solver->packs, solver->v);
+      updates_spend(solver, &left, solver->packs.aggregate->cost);
+      way.begun = false;
+      before[0] = before[1] = 0.0;
     }
     /* Direct solves may have one half of the budget: where they lead in circles between two sets of
      * active rows, sweeps from the second half still come near, and the next tick starts from

@@ -5,7 +5,11 @@
 
 /* The work on packs, for a file that says with which registers (base/four.h). */
 
+#include <stddef.h>
+#include <string.h>
+
 #include "base/four.h"
+#include "solver/aggregate.h"
 #include "solver/packs.h"
 
 /* Of the bodies in the lanes. */
@@ -216,6 +220,112 @@ static void packs_sweep(const hapi_packs *packs, double (*v)[6], bool forward, h
   double most = hapi_four_most(sum.largest);
   io->largest = most > io->largest ? most : io->largest;
   io->energy2 += hapi_four_sum(sum.energy2);
+}
+
+/* ---- the normals of each pair as one row (solver/aggregate.h) ---- */
+
+typedef struct lanes_aggregate {
+  hapi_four linear[3];
+  hapi_four turn[2][3];
+  hapi_four spin[2][3];
+  hapi_four error;
+  hapi_four softness;
+  hapi_four sum;
+} lanes_aggregate;
+
+static inline void aggregate_add(const double (*in)[HAPI_LANES], hapi_four share, hapi_four io[3])
+{
+  for (int k = 0; k < 3; ++k) {
+    io[k] = hapi_four_madd(io[k], share, hapi_four_load(in[k]));
+  }
+}
+
+static inline hapi_four aggregate_dot(const hapi_four a[3], const hapi_four b[3])
+{
+  hapi_four sum = hapi_four_mul(a[0], b[0]);
+  sum = hapi_four_madd(sum, a[1], b[1]);
+  return hapi_four_madd(sum, a[2], b[2]);
+}
+
+/* In shares of the impulses, times their sum. */
+static inline void pack_aggregate(const hapi_packs *packs, const hapi_pack *pack, double (*v)[6],
+                                  bool paired, lanes_aggregate *out)
+{
+  lanes_aggregate sum;
+  lanes_twist a;
+  lanes_twist b;
+  memset(&sum, 0, sizeof sum);
+  for (uint32_t i = pack->first; i < pack->first + pack->count; ++i) {
+    const hapi_pack_contact *c = &packs->contacts[i];
+    hapi_four p = hapi_four_load(packs->impulse[i][0]);
+    hapi_four soft = hapi_four_mul(hapi_four_load(c->softness[0]), p);
+    sum.sum = hapi_four_add(sum.sum, p);
+    sum.softness = hapi_four_madd(sum.softness, soft, p);
+    sum.error = hapi_four_madd(sum.error, p, hapi_four_sub(hapi_four_load(c->drive[0]), soft));
+    aggregate_add(c->direction[0], p, sum.linear);
+    aggregate_add(c->turn_a[0], p, sum.turn[0]);
+    aggregate_add(c->spin_a[0], p, sum.spin[0]);
+    if (paired) {
+      aggregate_add(c->turn_b[0], p, sum.turn[1]);
+      aggregate_add(c->spin_b[0], p, sum.spin[1]);
+    }
+  }
+  twist_gather(v, pack->a, &a);
+  hapi_four w = hapi_four_add(aggregate_dot(sum.linear, a.of), aggregate_dot(sum.turn[0], a.of + 3));
+  if (paired) {
+    twist_gather(v, pack->b, &b);
+    w = hapi_four_add(w, hapi_four_sub(aggregate_dot(sum.turn[1], b.of + 3),
+                                       aggregate_dot(sum.linear, b.of)));
+  }
+  sum.error = hapi_four_sub(sum.error, w);
+  *out = sum;
+}
+
+static inline void aggregate_store(const hapi_four in[3], const double inverse[HAPI_LANES], size_t at,
+                                   hapi_aggregate_row *out)
+{
+  for (int k = 0; k < 3; ++k) {
+    double x[HAPI_LANES];
+    hapi_four_store(x, in[k]);
+    for (uint32_t lane = 0; lane < HAPI_LANES; ++lane) {
+      double *to = (double *)((char *)&out[lane] + at);
+      to[k] = x[lane] * inverse[lane];
+    }
+  }
+}
+
+static void packs_aggregate(const hapi_packs *packs, double (*v)[6], hapi_aggregate_row *out)
+{
+  for (uint32_t i = 0; i < packs->count; ++i, out += HAPI_LANES) {
+    const hapi_pack *pack = &packs->of[i];
+    lanes_aggregate in;
+    double inverse[HAPI_LANES];
+    double error[HAPI_LANES];
+    double softness[HAPI_LANES];
+    double sum[HAPI_LANES];
+    if (pack->paired) {
+      pack_aggregate(packs, pack, v, true, &in);
+    } else {
+      pack_aggregate(packs, pack, v, false, &in);
+    }
+    hapi_four_store(sum, in.sum);
+    hapi_four_store(error, in.error);
+    hapi_four_store(softness, in.softness);
+    for (uint32_t lane = 0; lane < HAPI_LANES; ++lane) {
+      inverse[lane] = sum[lane] > 0.0 ? 1.0 / sum[lane] : 0.0;
+      out[lane].error = error[lane] * inverse[lane];
+      out[lane].softness = softness[lane] * inverse[lane] * inverse[lane];
+      out[lane].sum = sum[lane];
+      out[lane].mass[0] = pack->mass_a[lane];
+      out[lane].mass[1] = pack->mass_b[lane];
+    }
+    aggregate_store(in.linear, inverse, offsetof(hapi_aggregate_row, linear), out);
+    for (size_t side = 0; side < 2; ++side) {
+      size_t further = side * sizeof out->turn[0];
+      aggregate_store(in.turn[side], inverse, offsetof(hapi_aggregate_row, turn) + further, out);
+      aggregate_store(in.spin[side], inverse, offsetof(hapi_aggregate_row, spin) + further, out);
+    }
+  }
 }
 
 /* count is a multiple of four, as in the next. */

@@ -364,6 +364,9 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
       packs->count = 0;
       return false;
     }
+    if (packs->aggregate != NULL) {
+      hapi_aggregate_plan(packs);
+    }
   }
   packs_fill(packs, rows);
   packs->known.filled = packs->known.made;

@@ -12,6 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "solver/aggregate.h"
 #include "solver/row.h"
 
 #define HAPI_LANES 4u
@@ -83,6 +84,8 @@ typedef struct hapi_pack_work {
   double (*way_energy)(const double *now, const double *begin, const double *response,
                        size_t count);
   void (*way_go_on)(double *now, double *begin, double *way, double share, size_t count);
+  /* The rows of all lanes, HAPI_LANES a pack. */
+  void (*aggregate)(const struct hapi_packs *packs, double (*v)[6], hapi_aggregate_row *out);
 } hapi_pack_work;
 
 /* What is known of the rows. */
@@ -119,6 +122,7 @@ typedef struct hapi_packs {
   uint32_t height; /* the highest level */
   bool in_use;     /* the impulses of packed rows are here */
   hapi_packed_rows known;
+  hapi_aggregate *aggregate; /* NULL: no steps */
 } hapi_packs;
 
 extern const hapi_pack_work hapi_pack_work_pairs;       /* on every processor */

@@ -30,7 +30,8 @@
 #define TURN_MAX 0.05     /* rad a substep of the gyroscopic motion */
 #define TURN_SUBSTEPS 100 /* at most, a tick */
 
-#define COARSE_MOST 1e-12 /* J a body, of a sweep's corrections that stay undone in a tick */
+#define COARSE_REST 1e-12 /* J a body, of a sweep's corrections that stay undone in a tick */
+#define COARSE_MOST 1e-10 /* the most, under a hand */
 #define COARSE_FADE 0.98  /* a tick */
 
 /* ---- bodies ---- */
@@ -396,13 +397,14 @@ static void rows_note_unsolved(hapi_rows *rows)
  * forces become less, and stays while a hand that touched is in reach, as one that taps. */
 static void rows_set_coarse(hapi_rows *rows, bool reaches)
 {
-  double most = rows->drift > 0.0 ? COARSE_MOST * (double)rows->solver.body_count : 0.0;
   bool touches = rows->hand < HUGE_VAL;
   double before = rows->touched ? rows->solver.coarse : 0.0;
   rows->touched = reaches && (rows->touched || touches);
   if (touches) {
     before = hapi_max(rows->drift * rows->drift * rows->hand, COARSE_FADE * before);
   }
+  double most = (rows->touched ? COARSE_MOST : COARSE_REST) * (double)rows->solver.body_count;
+  most = rows->drift > 0.0 ? most : 0.0;
   rows->solver.coarse = rows->touched ? hapi_min(before, most) : most;
 }
 

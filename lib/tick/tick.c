@@ -72,6 +72,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(rows.solver.packs.loose, HAPI_LANES * packs + 1),
       ARRAY(rows.solver.packs.levels, places),
       ARRAY(rows.solver.packs.colors, places),
+      ARRAY(rows.solver.packs.aggregate, 1),
   };
   memcpy(out, all, sizeof all);
 }
