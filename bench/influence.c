@@ -102,7 +102,7 @@ static int by_boxes(const void *x, const void *y)
   return a->a != b->a ? (a->a > b->a) - (a->a < b->a) : (a->b > b->b) - (a->b < b->b);
 }
 
-/* ---- the truth ---- */
+/* ---- pairs that touch ---- */
 
 /* From the contacts of the last step. */
 static void hops_find(influence_bed *bed)
@@ -653,7 +653,7 @@ static hap_status worlds_run(influence_bed *bed)
       status = influence_range_try(b, worlds[i].name, &bed->world, bed->range_csv);
     }
     if (status >= HAP_OK && !world_measure(bed)) {
-      status = bench_fail(b, HAP_ERROR_MEMORY, "%s: no memory, or a world that is not right", name);
+      status = bench_fail(b, HAP_ERROR_MEMORY, "%s: no memory, or too many contacts", name);
     }
     world_finish(bed);
   }
