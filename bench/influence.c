@@ -626,8 +626,10 @@ static bool world_measure(influence_bed *bed)
     while (matter < count && ranks[matter].error > WANTED) {
       ++matter;
     }
-    bench_say("%s:%d: %zu bodies alone change the force by more than %g %%", bed->of->name,
-              bed->of->bodies, matter, 100.0 * WANTED);
+    bench_say(
+        "%s:%d: %zu bodies matter: the one that the hand meets, and those that alone change "
+        "the force by more than %g %%",
+        bed->of->name, bed->of->bodies, matter, 100.0 * WANTED);
     sets_try(bed, "influence", ranks, in);
   }
   free(in);
