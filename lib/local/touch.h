@@ -90,13 +90,14 @@ typedef struct hapi_local_contact {
   uint32_t pointer;
   uint32_t pointer_generation;
   uint32_t generation;
-  uint32_t epoch; /* of the body, when the model came */
-  uint32_t tool;  /* of a hull: 1 + index into the tools; 0: of a sphere */
-  uint32_t row;   /* model CONTACT: in this tick, HAPI_NO_ROW */
-  bool seen;      /* rendered at least once */
-  bool placed;    /* in this tick, where pointers touch several things */
-  bool hidden;    /* in this tick: the surface goes on behind it, see seams.h */
-  bool is_hidden; /* by what the model says; for shapes that the loop does not ask */
+  uint32_t epoch;      /* of the body, when the model came */
+  uint32_t tool;       /* of a hull: 1 + index into the tools; 0: of a sphere */
+  uint32_t row;        /* model CONTACT: in this tick, HAPI_NO_ROW */
+  uint32_t next_hider; /* scratch of seams.c */
+  bool seen;           /* rendered at least once */
+  bool placed;         /* in this tick, where pointers touch several things */
+  bool hidden;         /* in this tick: the surface goes on behind it, see seams.h */
+  bool is_hidden;      /* by what the model says; for shapes that the loop does not ask */
 
   double point_body[3];
   double normal_body[3];
