@@ -505,7 +505,7 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
       placed = !facts->faulted && pointer_place(touches, c, facts->period, &at, sample);
     }
     c->row = HAPI_NO_ROW;
-    touches->close += c->tool == 0 && c->ramp.depth > -CLOSE;
+    touches->close += c->tool == 0 && c->ramp.depth > -CLOSE && hapi_touch_has_shape(c);
     if (placed && pointers->grabs) {
       double touches_by = hapi_held_touches_by(at.pointer, c);
       at.share *= touches_by;

@@ -13,12 +13,6 @@
 #define ON_MOST 1e-4
 #define REACH 2.0 /* radii: things that are farther have no part in the touch */
 
-/* Whether the contact has a shape that can be asked: others hide nothing. */
-static bool has_shape(const hapi_local_contact *c)
-{
-  return c->asked.has || c->asked.shape.kind == HAPI_SHAPE_PLANE;
-}
-
 /* m, from a ball to the contact's shape; false: it has none that can be asked. */
 static bool shape_distance(const hapi_touches *touches, const hapi_local_contact *c,
                            const hapi_local_body *body, const double center[3], double radius,
@@ -26,7 +20,7 @@ static bool shape_distance(const hapi_touches *touches, const hapi_local_contact
 {
   hapi_touch_frame frame = {NULL, NULL};
   hapi_nearest nearest;
-  if (!has_shape(c)) {
+  if (!hapi_touch_has_shape(c)) {
     return false;
   }
   if (c->asked.told.count > 0) {
@@ -118,7 +112,7 @@ static uint32_t hiders_list(const hapi_pointers *pointers, const hapi_touches *t
   uint32_t first = HAPI_SLOT_NONE;
   for (uint32_t i = touches->count; i > 0; --i) {
     hapi_local_contact *c = &touches->of[i - 1];
-    if (has_shape(c) && is_near(c, pointers)) {
+    if (hapi_touch_has_shape(c) && is_near(c, pointers)) {
       c->next_hider = first;
       first = i - 1;
     }

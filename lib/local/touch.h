@@ -214,7 +214,7 @@ typedef struct hapi_touches {
   hapi_local_contact *of; /* of spheres, then of hulls; count in all */
   uint32_t count;
   uint32_t pushing;         /* that push in this tick */
-  uint32_t close;           /* spheres' that touched in the last tick, or nearly */
+  uint32_t close;           /* spheres' with shapes that touched in the last tick, or nearly */
   bool rubs;                /* some contact rubs */
   hapi_kept_touch *kept;    /* capacity.contacts */
   hapi_friction *frictions; /* by contact slot; of spheres */
@@ -231,6 +231,12 @@ typedef struct hapi_touches {
   double hand_impulse[3];   /* N s on dynamic bodies, all pointers */
   double hand_impulse_abs;
 } hapi_touches;
+
+/* Whether the contact has a shape that can be asked: others hide nothing, and are not hidden. */
+static inline bool hapi_touch_has_shape(const hapi_local_contact *c)
+{
+  return c->asked.has || c->asked.shape.kind == HAPI_SHAPE_PLANE;
+}
 
 /* What is kept of the contact. */
 static inline hapi_friction *hapi_friction_of(const hapi_touches *touches,
