@@ -39,6 +39,7 @@ typedef struct hapi_contact_memory {
   uint64_t surface; /* hash of it: the message before is not ours any more */
   double core_a[3];
   double impulse[3]; /* N s: normal, friction 1 and 2 */
+  double held[3];    /* N s, on the first body in a tick, while it is still: see body_still.h */
   hapi_contact_kept kept;
 } hapi_contact_memory;
 
@@ -51,6 +52,8 @@ typedef struct hapi_body_contacts {
   uint32_t bucket_count; /* power of 2 */
   uint32_t buckets_used; /* likewise; scratch of the matching */
   uint32_t active;       /* that push in this tick */
+  uint32_t still_active; /* likewise, of contacts without rows: their islands are still */
+  bool adopted;          /* since rows were made */
   uint64_t rowed_tick;   /* the last one in which rows were made */
 } hapi_body_contacts;
 

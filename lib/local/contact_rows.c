@@ -8,6 +8,7 @@
 #include "base/assert.h"
 #include "local/body_stay.h"
 #include "local/body_step.h"
+#include "local/body_still.h"
 #include "local/touch_place.h"
 
 /* Contacts between bodies as rows of the solver. A contact is placed anew from the poses of its
@@ -515,6 +516,38 @@ static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies
   }
 }
 
+bool hapi_contact_is_near(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
+                          uint32_t index, const hapi_tick_facts *facts)
+{
+  const hapi_contact_kept *kept = &contacts->memory[index].kept;
+  placed_contact c;
+  if (kept->what != HAPI_KEPT_NOTHING) {
+    const hapi_local_body *a = hapi_bodies_at(bodies, kept->body_a);
+    const hapi_local_body *b = hapi_bodies_at(bodies, kept->body_b);
+    bool stay = hapi_stay_number(a) == kept->stay_a && hapi_stay_number(b) == kept->stay_b;
+    if (stay && (kept->what == HAPI_KEPT_IDLE || kept->what == HAPI_KEPT_ROWS ||
+                 still_apart(kept, a, b, facts->period))) {
+      return kept->what == HAPI_KEPT_ROWS;
+    }
+  }
+  return find_contact(contacts, bodies, index, &c) && contact_place(&c) &&
+         is_near(&c, facts->period);
+}
+
+/* Those of islands that are still have no rows. */
+static bool contact_rests(hapi_body_contacts *contacts, const hapi_bodies *bodies, uint32_t index)
+{
+  const hapi_contact_memory *memory = &contacts->memory[index];
+  const hapi_contact_kept *kept = &memory->kept;
+  if (kept->what != HAPI_KEPT_ROWS ||
+      !hapi_contact_is_still(kept, hapi_bodies_at(bodies, kept->body_a),
+                             hapi_bodies_at(bodies, kept->body_b))) {
+    return false;
+  }
+  contacts->still_active += memory->impulse[0] > 0.0;
+  return true;
+}
+
 void hapi_contact_rows(hapi_body_contacts *contacts, const hapi_bodies *bodies, hapi_rows *rows,
                        const hapi_tick_facts *facts, hapi_effect_sample *sample)
 {
@@ -522,10 +555,19 @@ void hapi_contact_rows(hapi_body_contacts *contacts, const hapi_bodies *bodies, 
     return;
   }
   bool goes_on = contacts->rowed_tick + 1 == facts->tick;
+  bool all_still = bodies->still > 0 && bodies->still == bodies->live_count && !contacts->adopted;
+  contacts->rowed_tick = facts->tick;
+  contacts->adopted = false;
+  if (all_still) {
+    return;
+  }
+  contacts->still_active = 0;
   for (uint32_t i = 0; i < contacts->patches->contact_count; ++i) {
+    if (bodies->still > 0 && contact_rests(contacts, bodies, i)) {
+      continue;
+    }
     if (!goes_on || !contact_goes_on(contacts, bodies, i, rows, facts, sample)) {
       contact_make(contacts, bodies, i, rows, facts, sample);
     }
   }
-  contacts->rowed_tick = facts->tick;
 }
