@@ -124,11 +124,11 @@ void hapi_still_check(hapi_body_contacts *contacts, hapi_bodies *bodies, hapi_ro
 /* ---- who stands still ---- */
 
 /* By the body alone. */
-static bool may_stand(hapi_local_body *body)
+static bool may_stand(hapi_local_body *body, double period)
 {
   hapi_body_stay *stay = &body->stay;
   const uint32_t others = HAPI_BODY_MEASURED | HAPI_BODY_BRACED | HAPI_BODY_SHARED;
-  return stay->still.quiet >= HAPI_STILL_TICKS && hapi_body_is_owned(body) &&
+  return hapi_still_is_quiet(body, period) && hapi_body_is_owned(body) &&
          hapi_body_responds(body) && (body->flags & others) == 0 && !body->waiting &&
          stay->number != HAPI_STAY_UNKNOWN &&
          hapi_stay_measure(&stay->pose, &body->pose, stay->moved);
@@ -174,13 +174,13 @@ static bool contact_stands(const hapi_body_contacts *contacts, const hapi_row_so
 }
 
 static void islands_find(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
-                         const hapi_rows *rows)
+                         const hapi_rows *rows, double period)
 {
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     if (!hapi_body_is_still(body)) {
       body->stay.still.parent = bodies->live[i];
-      body->stay.still.ends = !may_stand(body);
+      body->stay.still.ends = !may_stand(body, period);
     }
   }
   for (uint32_t i = 0; i < rows->solver.row_count;) {
@@ -218,6 +218,7 @@ static void contact_settle(hapi_body_contacts *contacts, const hapi_rows *rows, 
 {
   const hapi_row_source *source = &rows->sources[first];
   double *held = contacts->memory[source->contact].held;
+  contacts->still_active += rows->solver.rows[first].impulse > 0.0;
   hapi_v3_set(held, 0.0, 0.0, 0.0);
   for (uint32_t i = first; i < first + source->count; ++i) {
     hapi_v3_madd(held, rows->solver.rows[i].impulse, rows->solver.rows[i].ja, held);
@@ -231,7 +232,7 @@ void hapi_still_find(hapi_body_contacts *contacts, hapi_bodies *bodies, hapi_row
   if (contacts->patches == NULL || bodies->never_still || bodies->unsound) {
     return;
   }
-  islands_find(contacts, bodies, rows);
+  islands_find(contacts, bodies, rows, facts->period);
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     uint32_t root = hapi_body_is_still(body) ? 0 : root_of(bodies, bodies->live[i]);

@@ -22,9 +22,10 @@
 #define HAPI_STILL_SPEED 2e-9
 #define HAPI_STILL_ARM 0.1 /* m */
 
-/* Ticks. What falls over from its edge has then grown by more than the next, and is not still. */
-#define HAPI_STILL_TICKS 100u
-#define HAPI_STILL_GROWTH 1.5
+/* s, in which the motion has not grown by more than the next: what falls over from its edge begins
+ * as slowly as creeping does, but gains speed. An acceleration of 2e-10 m/s^2 is not seen. */
+#define HAPI_STILL_TIME 0.1
+#define HAPI_STILL_GROWTH 1.01
 #define HAPI_STILL_NOISE 1e-12 /* m/s: less is rounding */
 
 static inline bool hapi_body_is_still(const hapi_local_body *body)
@@ -61,6 +62,11 @@ static inline void hapi_still_follow(hapi_local_body *body)
   } else {
     ++still->quiet;
   }
+}
+
+static inline bool hapi_still_is_quiet(const hapi_local_body *body, double period)
+{
+  return period * body->stay.still.quiet >= HAPI_STILL_TIME;
 }
 
 /* Whether a still body is as it was, before anything of this tick touches it. After row, flags and

@@ -57,7 +57,7 @@ static void body_begin_awake(hapi_bodies *bodies, hapi_local_body *body, double 
   hapi_body_place(body);
   hapi_stay_follow(bodies, body);
   hapi_still_follow(body);
-  bodies->quiet += body->stay.still.quiet >= HAPI_STILL_TICKS;
+  bodies->quiet += hapi_still_is_quiet(body, period);
   hapi_body_free_velocity(body, period, solver->v[body->row]);
   memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
   bodies->resting += (body->flags & HAPI_BODY_RESTING) != 0;
