@@ -204,6 +204,7 @@ static void body_settle(hapi_local_body *body, uint32_t island, double period)
   memset(&body->twist, 0, sizeof body->twist);
   memset(body->start_twist, 0, sizeof body->start_twist);
   hapi_body_place(body);
+  hapi_stay_sum(stay);
   stay->speed = stay->spin = 0.0;
   stay->still.island = island;
   stay->still.contacts = 0;

@@ -21,13 +21,17 @@ typedef struct hapi_contact_kept {
   uint64_t stay_a;
   uint64_t stay_b;
   double gap;     /* m, at the poses where the stays began; APART: the least while they last */
-  double reach_a; /* APART: m, from the body's centre to the contact */
+  double reach_a; /* m, from the body's centre to the contact, or more */
   double reach_b;
+  double least;    /* ROWS: m, this */
   uint32_t body_a; /* slots */
   uint32_t body_b;
   uint32_t first;   /* ROWS: where they stand, and how many */
   uint32_t surface; /* of the patches */
   uint8_t count;
+  bool plain;   /* ROWS: their targets are those of a contact that touches, no deeper than the next:
+                   they ask for no more while the gap is between 0 and */
+  bool by_mass; /* ROWS: see hapi_contact_ready */
   bool all;     /* ROWS: one for each part that the surface has, whether the bodies touch or not */
   uint8_t what; /* HAPI_KEPT_ */
 } hapi_contact_kept;

@@ -382,9 +382,9 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
   out->what = what;
   out->body_a = c->in->body_a;
   out->body_b = c->in->body_b;
+  out->reach_a = reach_of(c->a, c->point);
+  out->reach_b = reach_of(c->b, c->point);
   if (what == HAPI_KEPT_APART) {
-    out->reach_a = reach_of(c->a, c->point);
-    out->reach_b = reach_of(c->b, c->point);
     out->gap = c->gap - most_closing(out);
   } else if (what == HAPI_KEPT_ROWS) {
     const hapi_row *normal = &rows->solver.rows[first];
@@ -392,6 +392,9 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
     out->surface = c->in->surface;
     out->count = (uint8_t)(rows->solver.row_count - first);
     out->all = (c->surface->flags & approx) == approx;
+    out->plain = false; /* that of the next tick, from which on they are kept */
+    out->by_mass = normal->triple == HAPI_TRIPLE_BY_MASS;
+    out->least = -c->surface->layer - PUSH_OUT_SLOP;
     for (uint32_t i = 0; i < out->count; ++i) {
       out->what = normal[i].inverse != 0.0 ? out->what : HAPI_KEPT_NOTHING;
     }
@@ -431,6 +434,29 @@ static bool rows_stand(const hapi_rows *rows, const hapi_contact_kept *kept, uin
          !source->pointer && source->count == kept->count;
 }
 
+#define GAP_ROUNDING 1e-12 /* m, more than that of a gap */
+
+/* Whether the rows are where they would come next and ask for what they asked for: then they are
+ * not even looked at. */
+static bool rows_stay(const hapi_rows *rows, const placed_contact *c,
+                      const hapi_contact_memory *memory)
+{
+  const hapi_contact_kept *kept = &memory->kept;
+  double sum = memory->impulse[0] + memory->impulse[1] + memory->impulse[2];
+  double most = hapi_stay_most(c->a, kept->reach_a) + hapi_stay_most(c->b, kept->reach_b);
+  most += GAP_ROUNDING;
+  return kept->plain && kept->first == rows->solver.row_count && rows_stand(rows, kept, c->index) &&
+         kept->gap + most <= 0.0 && kept->gap - most >= kept->least && hapi_finite(&sum, 1);
+}
+
+/* Whether what was set is what rows_stay may take for granted. */
+static bool rows_are_plain(const hapi_row *normal, const hapi_contact_kept *kept, double gap,
+                           const hapi_tick_facts *facts)
+{
+  return normal->triple != 0 && (normal->paired || normal->single) && kept->all && gap <= 0.0 &&
+         gap >= kept->least && !facts->bounces;
+}
+
 /* The rows of the tick before again, at the place that comes next; false: they have to be made. */
 static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *memory,
                        const hapi_tick_facts *facts, hapi_effect_sample *sample)
@@ -461,6 +487,7 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   }
   rows->sources[first].pushes_out = false;
   set_normal(facts, c, &solver->rows[first], &rows->sources[first], sample);
+  kept->plain = rows_are_plain(&solver->rows[first], kept, c->gap, facts);
   solver->row_count += count;
   hapi_contact_again(solver, first, count);
   return true;
@@ -488,6 +515,11 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
   }
   if (kept->what == HAPI_KEPT_APART) {
     return still_apart(kept, c.a, c.b, facts->period);
+  }
+  if (!facts->bounces && rows_stay(rows, &c, memory)) {
+    rows->solver.row_count += kept->count;
+    hapi_contact_stands(&rows->solver, kept->by_mass);
+    return true;
   }
   c.surface = &hapi_patches_surfaces(contacts->patches)[kept->surface];
   return rows_go_on(rows, &c, memory, facts, sample);
