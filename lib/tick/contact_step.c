@@ -319,11 +319,17 @@ static inline uint32_t account_contact(const hapi_rows *rows, hapi_bodies *bodie
   HAPI_ASSERT_INDEX(source->contact, contacts->memory_count);
   HAPI_ASSERT(source->part == 0 && source->count > 0);
   double *impulse = contacts->memory[source->contact].impulse;
-  bool pushes = false;
-  for (uint32_t i = 0; i < source->count; ++i) {
-    HAPI_ASSERT_INDEX(source[i].part, 3);
-    impulse[source[i].part] = row[i].impulse;
-    pushes = pushes || row[i].impulse != 0.0;
+  bool pushes = row->impulse != 0.0;
+  impulse[0] = row->impulse;
+  if (source->count == 3) { /* nearly all */
+    HAPI_ASSERT(source[1].part == 1 && source[2].part == 2);
+    impulse[1] = row[1].impulse;
+    impulse[2] = row[2].impulse;
+    pushes = pushes || row[1].impulse != 0.0 || row[2].impulse != 0.0;
+  } else if (source->count == 2) {
+    HAPI_ASSERT_INDEX(source[1].part, 3);
+    impulse[source[1].part] = row[1].impulse;
+    pushes = pushes || row[1].impulse != 0.0;
   }
   contacts->active += row->impulse > 0.0;
   if (pushes) {
