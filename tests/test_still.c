@@ -345,9 +345,9 @@ TEST(what_falls_over_is_never_still)
   CHECK(fabs(f.bodies[0].twist.angular[1]) > 10.0 * HAPI_STILL_SPEED);
 }
 
-TEST(limits)
+TEST(the_limits_are_these)
 {
   CHECK_NEAR(HAPI_STILL_SPEED, 2e-9, 0.0); /* m/s */
-  CHECK_NEAR(HAPI_STILL_TIME, 0.1, 0.0); /* s */
+  CHECK_NEAR(HAPI_STILL_TIME, 0.1, 0.0);   /* s */
   CHECK_NEAR(HAPI_STILL_GROWTH, 1.01, 0.0);
 }

@@ -11,10 +11,10 @@
  * a body, its mass, a contact that came, went or changed its surface, a row of a pointer or joint,
  * or something that comes so near that it would have rows. */
 
+#include "base/assert.h"
 #include "local/body.h"
 #include "local/body_step.h"
 #include "local/contact_memory.h"
-#include "local/facts.h"
 #include "local/rows.h"
 
 /* m/s: what softness lets a contact creep by, and rounding. 2e-9 m/s are 7 um in an hour. The turn
@@ -41,7 +41,7 @@ static inline hapi_body_still *hapi_still_island(const hapi_bodies *bodies,
   return &bodies->of[body->stay.still.island - 1].stay.still;
 }
 
-/* The island wakes in this tick, by hapi_still_check. */
+/* The island wakes in this tick, by hapi_still_check (still_islands.h). */
 static inline void hapi_still_end(const hapi_bodies *bodies, const hapi_local_body *body)
 {
   if (hapi_body_is_still(body)) {
@@ -94,14 +94,5 @@ static inline bool hapi_contact_is_still(const hapi_contact_kept *kept, const ha
          (hapi_body_is_still(b) || b == NULL) && hapi_stay_number(a) == kept->stay_a &&
          hapi_stay_number(b) == kept->stay_b;
 }
-
-/* The islands that go on being still, of those that were. After all rows but those of contacts,
- * which are in v as well. What wakes is as if it had never been still. */
-void hapi_still_check(hapi_body_contacts *contacts, hapi_bodies *bodies, hapi_rows *rows,
-                      const hapi_tick_facts *facts);
-
-/* The islands that are still from the next tick on. At the end of a tick, after its books. */
-void hapi_still_find(hapi_body_contacts *contacts, hapi_bodies *bodies, hapi_rows *rows,
-                     const hapi_tick_facts *facts);
 
 #endif

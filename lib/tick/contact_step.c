@@ -17,6 +17,7 @@
 #include "local/gyro.h"
 #include "local/pointer_forces.h"
 #include "local/pointer_rows.h"
+#include "local/still_islands.h"
 #include "local/tool_place.h"
 #include "pointer/proxy.h"
 #include "pointer/rigid_proxy.h"

@@ -1,10 +1,11 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
-#include "local/body_still.h"
+#include "local/still_islands.h"
 
 #include <string.h>
 
 #include "base/assert.h"
+#include "local/body_still.h"
 #include "local/contact_rows.h"
 
 /* Places in the solver's v are given in the order of the live bodies, behind the static world's.
