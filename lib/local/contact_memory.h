@@ -21,7 +21,7 @@ typedef struct hapi_contact_kept {
   uint64_t stay_a;
   uint64_t stay_b;
   double gap;     /* m, at the poses where the stays began; APART: the least while they last */
-  double reach_a; /* m, from the body's centre to the contact, or more */
+  double reach_a; /* m, by which the body's turn moves the contact, or more */
   double reach_b;
   double least;    /* ROWS: m, this */
   uint32_t body_a; /* slots */

@@ -382,9 +382,9 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
   out->what = what;
   out->body_a = c->in->body_a;
   out->body_b = c->in->body_b;
-  out->reach_a = reach_of(c->a, c->point);
-  out->reach_b = reach_of(c->b, c->point);
   if (what == HAPI_KEPT_APART) {
+    out->reach_a = reach_of(c->a, c->point);
+    out->reach_b = reach_of(c->b, c->point);
     out->gap = c->gap - most_closing(out);
   } else if (what == HAPI_KEPT_ROWS) {
     const hapi_row *normal = &rows->solver.rows[first];
@@ -392,9 +392,7 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
     out->surface = c->in->surface;
     out->count = (uint8_t)(rows->solver.row_count - first);
     out->all = (c->surface->flags & approx) == approx;
-    out->plain = false; /* that of the next tick, from which on they are kept */
-    out->by_mass = normal->triple == HAPI_TRIPLE_BY_MASS;
-    out->least = -c->surface->layer - PUSH_OUT_SLOP;
+    out->plain = false; /* what moves has rows made anew: the next tick has time to find out */
     for (uint32_t i = 0; i < out->count; ++i) {
       out->what = normal[i].inverse != 0.0 ? out->what : HAPI_KEPT_NOTHING;
     }
@@ -449,12 +447,37 @@ static bool rows_stay(const hapi_rows *rows, const placed_contact *c,
          kept->gap + most <= 0.0 && kept->gap - most >= kept->least && hapi_finite(&sum, 1);
 }
 
-/* Whether what was set is what rows_stay may take for granted. */
-static bool rows_are_plain(const hapi_row *normal, const hapi_contact_kept *kept, double gap,
-                           const hapi_tick_facts *facts)
+/* What rows_stay stands for. */
+static bool rows_ask_alike(const hapi_rows *rows, const placed_contact *c,
+                           const hapi_contact_memory *memory)
 {
-  return normal->triple != 0 && (normal->paired || normal->single) && kept->all && gap <= 0.0 &&
-         gap >= kept->least && !facts->bounces;
+  const hapi_row *normal = &rows->solver.rows[memory->kept.first];
+  double gap =
+      memory->kept.gap + hapi_stay_moved(c->a, normal->ja) + hapi_stay_moved(c->b, normal->jb);
+  bool same = normal->impulse == memory->impulse[0] && normal[1].impulse == memory->impulse[1] &&
+              normal[2].impulse == memory->impulse[2];
+  return same && gap <= 0.0 && -gap - c->surface->layer - PUSH_OUT_SLOP <= 0.0 &&
+         normal->target == c->surface->motion[2] && normal->drive == normal->target &&
+         !rows->sources[memory->kept.first].pushes_out;
+}
+
+static double turn_of(const double j[6])
+{
+  return fabs(j[3]) + fabs(j[4]) + fabs(j[5]);
+}
+
+/* After the normal was set: whether rows_stay may take it for granted, and how long. */
+static void rows_note_plain(const hapi_row *normal, const placed_contact *c,
+                            const hapi_tick_facts *facts, hapi_contact_kept *out)
+{
+  out->least = -c->surface->layer - PUSH_OUT_SLOP;
+  out->plain = normal->triple != 0 && (normal->paired || normal->single) && out->all &&
+               c->gap <= 0.0 && c->gap >= out->least && !facts->bounces;
+  if (out->plain) {
+    out->by_mass = normal->triple == HAPI_TRIPLE_BY_MASS;
+    out->reach_a = turn_of(normal->ja);
+    out->reach_b = normal->single ? 0.0 : turn_of(normal->jb);
+  }
 }
 
 /* The rows of the tick before again, at the place that comes next; false: they have to be made. */
@@ -487,7 +510,7 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   }
   rows->sources[first].pushes_out = false;
   set_normal(facts, c, &solver->rows[first], &rows->sources[first], sample);
-  kept->plain = rows_are_plain(&solver->rows[first], kept, c->gap, facts);
+  rows_note_plain(&solver->rows[first], c, facts, kept);
   solver->row_count += count;
   hapi_contact_again(solver, first, count);
   return true;
@@ -516,12 +539,13 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
   if (kept->what == HAPI_KEPT_APART) {
     return still_apart(kept, c.a, c.b, facts->period);
   }
+  c.surface = &hapi_patches_surfaces(contacts->patches)[kept->surface];
   if (!facts->bounces && rows_stay(rows, &c, memory)) {
+    HAPI_ASSERT(rows_ask_alike(rows, &c, memory));
     rows->solver.row_count += kept->count;
     hapi_contact_stands(&rows->solver, kept->by_mass);
     return true;
   }
-  c.surface = &hapi_patches_surfaces(contacts->patches)[kept->surface];
   return rows_go_on(rows, &c, memory, facts, sample);
 }
 
