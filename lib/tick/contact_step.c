@@ -49,16 +49,21 @@ static void body_begin(hapi_local_body *body, const hapi_patches *patches)
   body->rowed = false;
 }
 
-/* Of one that moves, or may. */
-static void body_begin_awake(hapi_bodies *bodies, hapi_local_body *body, double period,
+/* Of one that moves, or may. stays: there are contacts whose rows may be kept. */
+static void body_begin_awake(hapi_bodies *bodies, hapi_local_body *body, bool stays, double period,
                              hapi_solver *solver)
 {
   HAPI_ASSERT_UNIT_QUAT(body->pose.quat_wxyz);
   memcpy(body->start_twist, &body->twist, sizeof body->start_twist);
   hapi_body_place(body);
-  hapi_stay_follow(bodies, body);
-  hapi_still_follow(body);
-  bodies->quiet += hapi_still_is_quiet(body, period);
+  if (stays) {
+    hapi_stay_follow(bodies, body);
+    hapi_still_follow(body);
+    bodies->quiet += hapi_still_is_quiet(body, period);
+  } else {
+    hapi_stay_end(body);
+    body->stay.still.quiet = 0;
+  }
   hapi_body_free_velocity(body, period, solver->v[body->row]);
   memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
   bodies->resting += (body->flags & HAPI_BODY_RESTING) != 0;
@@ -88,6 +93,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   solver->apart = true;
   rows->hand = HUGE_VAL;
   bodies->resting = bodies->quiet = 0;
+  bool stays = patches != NULL && patches->contact_count > 0;
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     HAPI_ASSERT_INDEX(bodies->live[i], bodies->high);
@@ -99,7 +105,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
     body->row = solver->body_count++;
     if (!body_begin_still(body, facts->period, solver)) {
       hapi_still_end(bodies, body);
-      body_begin_awake(bodies, body, facts->period, solver);
+      body_begin_awake(bodies, body, stays, facts->period, solver);
     }
   }
 }
