@@ -51,7 +51,8 @@ static void stacks_build(contact_world *w, double mu)
   dWorldSetContactSurfaceLayer(w->world, LAYER);
   cw_add_floor(w);
   for (int i = 0; i < 2 * HIGH; ++i) {
-    (void)cw_add_cube(w, 0.3, EDGE, 0.0, APART * (i / HIGH),
+    const int stack = i / HIGH;
+    (void)cw_add_cube(w, 0.3, EDGE, 0.0, APART * stack,
                       EDGE / 2 - LAYER / 2 + (EDGE - LAYER / 2) * (i % HIGH));
   }
 }
