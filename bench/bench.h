@@ -51,6 +51,7 @@ hap_status bench_fig6(bench *b);
 hap_status bench_fig7(bench *b);
 hap_status bench_hosting(bench *b);
 hap_status bench_impedance(bench *b);
+hap_status bench_influence(bench *b);
 hap_status bench_input(bench *b);
 hap_status bench_jitter(bench *b);
 hap_status bench_late(bench *b);

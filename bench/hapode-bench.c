@@ -55,6 +55,9 @@ static const program programs[] = {
      "what the hand feels at the port from 0.5 to 200 Hz, and the stiffest wall of each device; "
      "--coupling\n"
      "             NAME: through it in the proxy's place"},
+    {"influence", bench_influence,
+     "which bodies matter for the felt force, and what a border of the range costs; --scene "
+     "WORLD:N"},
     {"input", bench_input,
      "the felt force while a device tells positions that are false for 0.2 s"},
     {"jitter", bench_jitter,
@@ -202,7 +205,8 @@ static bool options_fit(const program *p, const bench *b)
                strcmp(b->estimates, "default") == 0;
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
       p->run != bench_effects && p->run != bench_faults && p->run != bench_late &&
-      p->run != bench_peers && p->run != bench_remote && p->run != bench_hosting) {
+      p->run != bench_peers && p->run != bench_remote && p->run != bench_hosting &&
+      p->run != bench_influence) {
     wrong = "has no scenes to choose from";
   } else if (b->random_worlds > 0 && (p->run != bench_faults || b->scene != NULL)) {
     wrong = "has no random worlds: --random is for faults, without --scene";

@@ -9,16 +9,17 @@
 
 #include "bench/peer.h"
 
-#define EDGE 0.05      /* m, of cubes */
-#define LAYER 1e-4     /* m */
-#define CUBE_MASS 0.2  /* kg */
-#define ROW_MASS 1.0   /* kg, all cubes of a row: the hand pushes rows of any length alike */
-#define PILE_MASS 2.0  /* kg, all cubes of a pile, so that the hand moves one of any size */
-#define PILE_CUBE 0.02 /* kg, of a cube at least: a lighter one makes the hand's damper unstable */
-#define APART 0.05     /* m, between cubes that do not touch */
-#define PILE_LAYERS 4  /* of cubes */
-#define BOXES_MAX 5000 /* of a world */
-#define HAND_GAP 1e-3  /* m, to the first box */
+#define EDGE 0.05       /* m, of cubes */
+#define LAYER 1e-4      /* m */
+#define CUBE_MASS 0.2   /* kg */
+#define ROW_MASS 1.0    /* kg, all cubes of a row: the hand pushes rows of any length alike */
+#define PILE_MASS 2.0   /* kg, all cubes of a pile, so that the hand moves one of any size */
+#define PILE_CUBE 0.02  /* kg, of a cube at least: a lighter one makes the hand's damper unstable */
+#define CARPET_GAP 1e-6 /* m: deeper ones that meet at a corner have contacts of a wrong normal */
+#define APART 0.05      /* m, between cubes that do not touch */
+#define PILE_LAYERS 4   /* of cubes */
+#define BOXES_MAX 5000  /* of a world */
+#define HAND_GAP 1e-3   /* m, to the first box */
 
 static peer_box *box_add(peer_world *w, const double edges[3], double mass, double x, double y,
                          double z)
@@ -71,6 +72,23 @@ static void row_build(peer_world *w, int count)
 {
   for (int i = 0; i < count; ++i) {
     cube_add(w, ROW_MASS / count, EDGE / 2 + (EDGE - LAYER) * i, 0.0, layer_height(0));
+  }
+  w->hand.way = 0.012;
+}
+
+/* A square of cubes; the hand meets the middle of a side. */
+static void carpet_build(peer_world *w, int count)
+{
+  const double pitch = EDGE + CARPET_GAP;
+  int side = (int)ceil(sqrt(count));
+  int middle = side / 2;
+  cube_add(w, ROW_MASS / side, EDGE / 2, 0.0, layer_height(0));
+  for (int i = 0; i < count; ++i) {
+    int along = i / side;
+    if (i != middle) {
+      cube_add(w, ROW_MASS / side, EDGE / 2 + pitch * along, pitch * (i % side - middle),
+               layer_height(0));
+    }
   }
   w->hand.way = 0.012;
 }
@@ -222,9 +240,9 @@ static const struct {
   void (*build)(peer_world *w, int count);
   int fixed; /* boxes that it has; 0: any number */
 } builders[] = {
-    {"apart", apart_build, 0},      {"apart_sleep", apart_build, 0}, {"row", row_build, 0},
-    {"pile", pile_build, 0},        {"tower", tower_build, 0},       {"chain", chain_build, 0},
-    {"ragdoll", ragdoll_build, 10}, {"mesh", mesh_build, 1},
+    {"apart", apart_build, 0}, {"apart_sleep", apart_build, 0}, {"row", row_build, 0},
+    {"pile", pile_build, 0},   {"carpet", carpet_build, 0},     {"tower", tower_build, 0},
+    {"chain", chain_build, 0}, {"ragdoll", ragdoll_build, 10},  {"mesh", mesh_build, 1},
 };
 
 static bool world_is_whole(const peer_world *w)

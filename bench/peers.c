@@ -136,7 +136,8 @@ static hap_status row_run(bench *b, const peers_row *row, const peer_world *worl
   const peer_engine *engine = row->who->engine;
   bool may_sleep = world_sleeps(row->of.world);
   if (engine == NULL) {
-    peers_session_setting setting = {row->who->physics_hz, row->of.haptic_hz, may_sleep};
+    peers_session_setting setting = {
+        .physics_hz = row->who->physics_hz, .haptic_hz = row->of.haptic_hz, .may_sleep = may_sleep};
     return peers_run_session(b, world, &setting, out);
   }
   peer_setting setting = {1.0 / row->of.haptic_hz, engine->iterations, may_sleep, false};

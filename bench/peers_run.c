@@ -115,7 +115,7 @@ hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_worl
 /* ---- a session ---- */
 
 /* us, since the session began: contact passes, cycles. */
-static void parts_read(const hap_session *session, double out[2])
+static void parts_read(const hap_session *session, double out[2], size_t *out_owned)
 {
   hap_stats stats;
   if (hap_session_stats(session, &stats, sizeof stats) < HAP_OK) {
@@ -124,6 +124,7 @@ static void parts_read(const hap_session *session, double out[2])
   }
   out[0] = stats.contact.us_mean * (double)stats.contact.passes;
   out[1] = 1e3 * stats.physics.ms_mean * (double)stats.physics.steps;
+  *out_owned = stats.model.range_bodies;
 }
 
 static void parts_note(peers_run *run, const double before[2], const double after[2])
@@ -166,6 +167,12 @@ static hap_status session_open(bench *b, size_t ticks, session_bed *bed)
   def.physics_hz = bed->setting->physics_hz;
   def.haptic_hz = bed->setting->haptic_hz;
   expert.trace_rows = (int32_t)ticks;
+  if (bed->setting->range_hops > 0) {
+    expert.range_hops = bed->setting->range_hops;
+  }
+  if (bed->setting->range_bodies > 0) {
+    def.max_bodies = bed->setting->range_bodies;
+  }
   def.expert = &expert;
   research.guard = HAP_GUARD_MEASURE; /* the hand is a prescribed motion */
   def.research = &research;
@@ -244,13 +251,13 @@ static hap_status session_run(bench *b, session_bed *bed, peers_run *out)
   }
   session_rest(bed, out);
   double parts[2][2];
-  parts_read(bed->session, parts[0]);
+  parts_read(bed->session, parts[0], &out->owned);
   double used = bench_used_seconds();
   for (size_t i = 0; i < out->count && status >= HAP_OK; ++i) {
     status = session_tick(b, bed, settle + i, out->force[i]);
   }
   used = bench_used_seconds() - used;
-  parts_read(bed->session, parts[1]);
+  parts_read(bed->session, parts[1], &out->owned);
   parts_note(out, parts[0], parts[1]);
   if (status >= HAP_OK) {
     status = session_times(b, bed, out);

@@ -21,6 +21,7 @@ typedef struct peers_run {
   } parts;
   double rest;   /* m, farthest way of a box from its begin while all settled */
   size_t asleep; /* boxes, at the end of settling */
+  size_t owned;  /* boxes of the loop at the end; of an engine 0 */
 } peers_run;
 
 hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_world *world,
@@ -30,9 +31,12 @@ typedef struct peers_session_setting {
   double physics_hz;
   double haptic_hz;
   bool may_sleep;
+  int range_hops;   /* of the range; 0: as by default */
+  int range_bodies; /* of the range at most; 0: as by default */
 } peers_session_setting;
 
-/* Model CONTACT at all defaults, in drive LOCKSTEP: everything is done by the calling thread. */
+/* Model CONTACT at all defaults but for these, in drive LOCKSTEP: everything is done by the calling
+ * thread. */
 hap_status peers_run_session(bench *b, const peer_world *world,
                              const peers_session_setting *setting, peers_run *out);
 

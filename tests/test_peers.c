@@ -57,6 +57,7 @@ TEST(worlds_are_as_described)
   world_check("row", 64, 1.0);
   world_check("pile", 30, 2.0);
   world_check("pile", 300, 6.0);
+  world_check("carpet", 49, 7.0);
   world_check("tower", 8, 1.6);
   world_check("chain", 10, 1.0);
   world_check("ragdoll", 10, 1.5);

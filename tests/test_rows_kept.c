@@ -225,6 +225,32 @@ TEST(rows_of_a_pointer_move_the_kept_ones)
   CHECK(p->generation != 0 && f.tick.guard.latch.fault == HAP_FAULT_NONE);
 }
 
+/* A pointer that is in touch at the tick's end, and not at its middle, begins a row and takes it
+ * back, where contacts had theirs. */
+TEST(a_pointer_that_comes_leaves_the_kept_rows_whole)
+{
+  const double way = 7e-6; /* m a tick */
+  box_rest();
+  hapi_pointer *p = add_pointer(0, -corner[0] - 0.01 - 71.7 * way, 0.0, -corner[2]);
+  box_add(MASS)->gravity[2] = -9.81;
+  hapi_v3_set(add_contact(0, 0, 0)->point_body, -corner[0], 0.0, 0.0);
+  model_adopt();
+  bool pushed = false;
+  for (int k = 0; k < 200; ++k) {
+    p->device.pose.position[0] += way;
+    p->device.twist.linear[0] = way / T;
+    ticks_run(1);
+    uint32_t first = f.tick.rows.solver.row_count - 12;
+    pushed = pushed || first > 0;
+    for (uint32_t i = first; i < first + 12; i += 3) {
+      CHECK(!f.sources[i].pointer && f.sources[i].part == 0);
+      CHECK_NEAR(f.rows[i].ja[2], 1.0, 1e-3);
+      CHECK_NEAR(f.rows[i].ba[2], 1.0 / MASS, 1e-3);
+    }
+  }
+  CHECK(pushed);
+}
+
 /* What rests for long stays: errors of the gap do not add up. */
 TEST(a_box_at_rest_does_not_creep_in_30_s)
 {

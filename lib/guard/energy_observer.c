@@ -7,6 +7,7 @@
 
 #include "base/safety.h"
 #include "base/vec.h"
+#include "local/body_still.h"
 #include "local/grab_rows.h"
 #include "local/pointer_friction.h"
 #include "local/touch_feel.h"
@@ -117,7 +118,8 @@ static double bodies_lose(const hapi_tick_facts *facts, const hapi_bodies *bodie
   }
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     const hapi_local_body *body = &bodies->of[bodies->live[i]];
-    if ((body->flags & HAPI_BODY_RESTING) == 0 && (body->flags & HAPI_BODY_OWNED) != 0) {
+    if ((body->flags & HAPI_BODY_RESTING) == 0 && (body->flags & HAPI_BODY_OWNED) != 0 &&
+        !hapi_body_is_still(body)) {
       sum += body_loses(body, facts->period, io_stored);
     }
   }

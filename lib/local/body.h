@@ -39,6 +39,21 @@ typedef struct hapi_body_left {
   hap_twist twist;
 } hapi_body_left;
 
+/* Whether the body stands still with its island, see body_still.h. */
+typedef struct hapi_body_still {
+  uint32_t island;   /* 1 + slot of one of its bodies; 0: it does not */
+  uint32_t parent;   /* scratch of finding islands: a slot */
+  uint32_t quiet;    /* ticks in a row in which it hardly moved, while it is not still */
+  bool touched;      /* a contact carries it */
+  bool ends;         /* of the island's one body, this and the next two: it wakes in this tick */
+  uint32_t contacts; /* that have rows while it is awake */
+  uint32_t found;    /* of those, in this tick; scratch */
+  double motion;     /* m/s, when quiet began; while it is still these stay as they are: */
+  uint64_t stay;     /* number */
+  hap_pose pose;
+  double free[6]; /* velocity after a tick in which nothing touched it */
+} hapi_body_still;
+
 /* Since when the body has hardly moved, see body_stay.h. */
 typedef struct hapi_body_stay {
   uint64_t number; /* no other stay of any body has it; 0: none */
@@ -47,8 +62,11 @@ typedef struct hapi_body_stay {
   bool waiting;
   hap_pose pose;
   double moved[6]; /* m, rad about world axes, from that pose to the one of this tick */
+  double way;      /* m, sum of the sizes of its linear components */
+  double turn;     /* rad, likewise of the others */
   double speed;    /* m/s, sum of the components' sizes */
   double spin;     /* rad/s, likewise */
+  hapi_body_still still;
 } hapi_body_stay;
 
 /* Of a copy of a body that another loop moves. */
@@ -112,6 +130,9 @@ typedef struct hapi_bodies {
   uint32_t high;           /* beyond the highest slot that was ever used */
   uint32_t resting;        /* at the tick's begin */
   uint64_t stays;          /* numbers of hapi_body_stay that were given, since start */
+  uint32_t still;          /* that stand still, see body_still.h */
+  uint32_t quiet;          /* that may soon, in this tick */
+  bool never_still;        /* all are awake: what else must come out the same, for tests */
   bool unsound;            /* a state was not finite in this tick */
   double given;            /* J, of this tick: what things of given motion did on owned bodies */
   double owned_impulse[3]; /* since start, see hapi_state */

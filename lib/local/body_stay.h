@@ -60,6 +60,19 @@ static inline bool hapi_stay_measure(const hap_pose *from, const hap_pose *to, d
   return way <= HAPI_STAY_WAY && angle <= HAPI_STAY_TURN && cosine * cosine > 0.5 && sum == sum;
 }
 
+static inline void hapi_stay_sum(hapi_body_stay *io)
+{
+  const double *m = io->moved;
+  io->way = fabs(m[0]) + fabs(m[1]) + fabs(m[2]);
+  io->turn = fabs(m[3]) + fabs(m[4]) + fabs(m[5]);
+}
+
+/* m, more than what is in reach of the centre has moved along any direction since then. */
+static inline double hapi_stay_most(const hapi_local_body *body, double reach)
+{
+  return body == NULL ? 0.0 : body->stay.way + reach * body->stay.turn;
+}
+
 /* At the begin of a tick, after row, flags, pose and twist. */
 static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
 {
@@ -71,6 +84,7 @@ static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
   stay->spin = fabs(w[0]) + fabs(w[1]) + fabs(w[2]);
   if (stay->number != HAPI_STAY_UNKNOWN && stay->flags == flags && stay->row == body->row &&
       stay->waiting == body->waiting && hapi_stay_measure(&stay->pose, &body->pose, stay->moved)) {
+    hapi_stay_sum(stay);
     return;
   }
   stay->number = HAPI_STAY_STATIC + ++bodies->stays;
@@ -79,6 +93,7 @@ static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
   stay->waiting = body->waiting;
   stay->pose = body->pose;
   memset(stay->moved, 0, sizeof stay->moved);
+  stay->way = stay->turn = 0.0;
 }
 
 #endif

@@ -9,10 +9,20 @@
 #include <string.h>
 
 #include "base/plausible.h"
+#include "base/pose.h"
 #include "base/vec.h"
 #include "local/body.h"
 #include "local/body_stay.h"
 #include "local/rows.h"
+
+/* What goes with its pose. */
+static inline void hapi_body_place(hapi_local_body *body)
+{
+  hapi_quat_to_matrix(body->pose.quat_wxyz, body->rotation);
+  if (!body->round && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
+    hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
+  }
+}
 
 /* Velocity after the tick if nothing touched the body. */
 static inline void hapi_body_free_velocity(const hapi_local_body *body, double period, double v[6])

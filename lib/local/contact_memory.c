@@ -117,6 +117,7 @@ void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patche
   contacts->memory = contacts->old_memory;
   contacts->old_memory = old;
   contacts->patches = patches;
+  contacts->adopted = true;
   contacts->memory_count = patches->contact_count;
   const hapi_patch_contact *in = hapi_patches_contacts(patches);
   uint64_t surface = 0;

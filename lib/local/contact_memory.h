@@ -21,13 +21,17 @@ typedef struct hapi_contact_kept {
   uint64_t stay_a;
   uint64_t stay_b;
   double gap;     /* m, at the poses where the stays began; APART: the least while they last */
-  double reach_a; /* APART: m, from the body's centre to the contact */
+  double reach_a; /* m, by which the body's turn moves the contact, or more */
   double reach_b;
+  double least;    /* ROWS: m, this */
   uint32_t body_a; /* slots */
   uint32_t body_b;
   uint32_t first;   /* ROWS: where they stand, and how many */
   uint32_t surface; /* of the patches */
   uint8_t count;
+  bool plain;   /* ROWS: their targets are those of a contact that touches, no deeper than the next:
+                   they ask for no more while the gap is between 0 and */
+  bool by_mass; /* ROWS: see hapi_contact_ready */
   bool all;     /* ROWS: one for each part that the surface has, whether the bodies touch or not */
   uint8_t what; /* HAPI_KEPT_ */
 } hapi_contact_kept;
@@ -39,6 +43,7 @@ typedef struct hapi_contact_memory {
   uint64_t surface; /* hash of it: the message before is not ours any more */
   double core_a[3];
   double impulse[3]; /* N s: normal, friction 1 and 2 */
+  double held[3];    /* N s, on the first body in a tick, while it is still: see body_still.h */
   hapi_contact_kept kept;
 } hapi_contact_memory;
 
@@ -51,6 +56,8 @@ typedef struct hapi_body_contacts {
   uint32_t bucket_count; /* power of 2 */
   uint32_t buckets_used; /* likewise; scratch of the matching */
   uint32_t active;       /* that push in this tick */
+  uint32_t still_active; /* likewise, of contacts without rows: their islands are still */
+  bool adopted;          /* since rows were made */
   uint64_t rowed_tick;   /* the last one in which rows were made */
 } hapi_body_contacts;
 

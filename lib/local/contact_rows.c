@@ -8,6 +8,7 @@
 #include "base/assert.h"
 #include "local/body_stay.h"
 #include "local/body_step.h"
+#include "local/body_still.h"
 #include "local/touch_place.h"
 
 /* Contacts between bodies as rows of the solver. A contact is placed anew from the poses of its
@@ -391,6 +392,7 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
     out->surface = c->in->surface;
     out->count = (uint8_t)(rows->solver.row_count - first);
     out->all = (c->surface->flags & approx) == approx;
+    out->plain = false; /* what moves has rows made anew: the next tick has time to find out */
     for (uint32_t i = 0; i < out->count; ++i) {
       out->what = normal[i].inverse != 0.0 ? out->what : HAPI_KEPT_NOTHING;
     }
@@ -430,6 +432,54 @@ static bool rows_stand(const hapi_rows *rows, const hapi_contact_kept *kept, uin
          !source->pointer && source->count == kept->count;
 }
 
+#define GAP_ROUNDING 1e-12 /* m, more than that of a gap */
+
+/* Whether the rows are where they would come next and ask for what they asked for: then they are
+ * not even looked at. */
+static bool rows_stay(const hapi_rows *rows, const placed_contact *c,
+                      const hapi_contact_memory *memory)
+{
+  const hapi_contact_kept *kept = &memory->kept;
+  double sum = memory->impulse[0] + memory->impulse[1] + memory->impulse[2];
+  double most = hapi_stay_most(c->a, kept->reach_a) + hapi_stay_most(c->b, kept->reach_b);
+  most += GAP_ROUNDING;
+  return kept->plain && kept->first == rows->solver.row_count && rows_stand(rows, kept, c->index) &&
+         kept->gap + most <= 0.0 && kept->gap - most >= kept->least && hapi_finite(&sum, 1);
+}
+
+/* What rows_stay stands for. */
+static bool rows_ask_alike(const hapi_rows *rows, const placed_contact *c,
+                           const hapi_contact_memory *memory)
+{
+  const hapi_row *normal = &rows->solver.rows[memory->kept.first];
+  double gap =
+      memory->kept.gap + hapi_stay_moved(c->a, normal->ja) + hapi_stay_moved(c->b, normal->jb);
+  bool same = normal->impulse == memory->impulse[0] && normal[1].impulse == memory->impulse[1] &&
+              normal[2].impulse == memory->impulse[2];
+  return same && gap <= 0.0 && -gap - c->surface->layer - PUSH_OUT_SLOP <= 0.0 &&
+         normal->target == c->surface->motion[2] && normal->drive == normal->target &&
+         !rows->sources[memory->kept.first].pushes_out;
+}
+
+static double turn_of(const double j[6])
+{
+  return fabs(j[3]) + fabs(j[4]) + fabs(j[5]);
+}
+
+/* After the normal was set: whether rows_stay may take it for granted, and how long. */
+static void rows_note_plain(const hapi_row *normal, const placed_contact *c,
+                            const hapi_tick_facts *facts, hapi_contact_kept *out)
+{
+  out->least = -c->surface->layer - PUSH_OUT_SLOP;
+  out->plain = normal->triple != 0 && (normal->paired || normal->single) && out->all &&
+               c->gap <= 0.0 && c->gap >= out->least && !facts->bounces;
+  if (out->plain) {
+    out->by_mass = normal->triple == HAPI_TRIPLE_BY_MASS;
+    out->reach_a = turn_of(normal->ja);
+    out->reach_b = normal->single ? 0.0 : turn_of(normal->jb);
+  }
+}
+
 /* The rows of the tick before again, at the place that comes next; false: they have to be made. */
 static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *memory,
                        const hapi_tick_facts *facts, hapi_effect_sample *sample)
@@ -460,6 +510,7 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   }
   rows->sources[first].pushes_out = false;
   set_normal(facts, c, &solver->rows[first], &rows->sources[first], sample);
+  rows_note_plain(&solver->rows[first], c, facts, kept);
   solver->row_count += count;
   hapi_contact_again(solver, first, count);
   return true;
@@ -489,6 +540,12 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
     return still_apart(kept, c.a, c.b, facts->period);
   }
   c.surface = &hapi_patches_surfaces(contacts->patches)[kept->surface];
+  if (!facts->bounces && rows_stay(rows, &c, memory)) {
+    HAPI_ASSERT(rows_ask_alike(rows, &c, memory));
+    rows->solver.row_count += kept->count;
+    hapi_contact_stands(&rows->solver, kept->by_mass);
+    return true;
+  }
   return rows_go_on(rows, &c, memory, facts, sample);
 }
 
@@ -515,6 +572,38 @@ static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies
   }
 }
 
+bool hapi_contact_is_near(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
+                          uint32_t index, const hapi_tick_facts *facts)
+{
+  const hapi_contact_kept *kept = &contacts->memory[index].kept;
+  placed_contact c;
+  if (kept->what != HAPI_KEPT_NOTHING) {
+    const hapi_local_body *a = hapi_bodies_at(bodies, kept->body_a);
+    const hapi_local_body *b = hapi_bodies_at(bodies, kept->body_b);
+    bool stay = hapi_stay_number(a) == kept->stay_a && hapi_stay_number(b) == kept->stay_b;
+    if (stay && (kept->what == HAPI_KEPT_IDLE || kept->what == HAPI_KEPT_ROWS ||
+                 still_apart(kept, a, b, facts->period))) {
+      return kept->what == HAPI_KEPT_ROWS;
+    }
+  }
+  return find_contact(contacts, bodies, index, &c) && contact_place(&c) &&
+         is_near(&c, facts->period);
+}
+
+/* Those of islands that are still have no rows. */
+static bool contact_rests(hapi_body_contacts *contacts, const hapi_bodies *bodies, uint32_t index)
+{
+  const hapi_contact_memory *memory = &contacts->memory[index];
+  const hapi_contact_kept *kept = &memory->kept;
+  if (kept->what != HAPI_KEPT_ROWS ||
+      !hapi_contact_is_still(kept, hapi_bodies_at(bodies, kept->body_a),
+                             hapi_bodies_at(bodies, kept->body_b))) {
+    return false;
+  }
+  contacts->still_active += memory->impulse[0] > 0.0;
+  return true;
+}
+
 void hapi_contact_rows(hapi_body_contacts *contacts, const hapi_bodies *bodies, hapi_rows *rows,
                        const hapi_tick_facts *facts, hapi_effect_sample *sample)
 {
@@ -522,10 +611,19 @@ void hapi_contact_rows(hapi_body_contacts *contacts, const hapi_bodies *bodies, 
     return;
   }
   bool goes_on = contacts->rowed_tick + 1 == facts->tick;
+  bool all_still = bodies->still > 0 && bodies->still == bodies->live_count && !contacts->adopted;
+  contacts->rowed_tick = facts->tick;
+  contacts->adopted = false;
+  if (all_still) {
+    return;
+  }
+  contacts->still_active = 0;
   for (uint32_t i = 0; i < contacts->patches->contact_count; ++i) {
+    if (bodies->still > 0 && contact_rests(contacts, bodies, i)) {
+      continue;
+    }
     if (!goes_on || !contact_goes_on(contacts, bodies, i, rows, facts, sample)) {
       contact_make(contacts, bodies, i, rows, facts, sample);
     }
   }
-  contacts->rowed_tick = facts->tick;
 }

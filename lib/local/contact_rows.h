@@ -14,6 +14,10 @@
 void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
                        hapi_rows *rows, double period);
 
+/* Whether the contact of that index would have rows. */
+bool hapi_contact_is_near(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
+                          uint32_t index, const hapi_tick_facts *facts);
+
 void hapi_contact_rows(hapi_body_contacts *contacts, const hapi_bodies *bodies, hapi_rows *rows,
                        const hapi_tick_facts *facts, hapi_effect_sample *sample);
 

@@ -86,7 +86,7 @@ static inline void hapi_contact_explain(hapi_pointer *p, const hapi_local_contac
   hapi_v3_sub(now, before, change);
   double changes = hapi_sum_of_sizes(change);
   e->world += k * period * (comes + hapi_sum_of_sizes(now) + changes) + d * changes;
-  e->speed = fmax(e->speed, hapi_sum_of_sizes(now) + changes);
+  e->speed = hapi_max(hapi_sum_of_sizes(now) + changes, e->speed); /* NaN does not count */
 }
 
 #endif

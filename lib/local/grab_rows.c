@@ -92,6 +92,9 @@ static void add_row(hapi_pointer *p, const hapi_local_body *body, uint32_t numbe
   hapi_row *row = &solver->rows[index];
   hapi_pointer_spring spring;
   HAPI_ASSERT_INDEX(index, rows->capacity);
+  /* Before the row: as in pointer_rows.c. */
+  rows->sources[index] =
+      (hapi_row_source){.body_a = p->grab.hold.body, .body_b = HAPI_SLOT_NONE, .pointer = true};
   row_columns(p, body, number, row);
   row_spring(p, body, number, row, &spring);
   hapi_spring_note(rows, p, spring.k, spring.a);
@@ -103,8 +106,6 @@ static void add_row(hapi_pointer *p, const hapi_local_body *body, uint32_t numbe
   row->single = row->ball = row->round = 0;
   row->normal = -1;
   row->impulse = period * (number < 3 ? pull->force[number] : pull->torque[number - 3]);
-  rows->sources[index] =
-      (hapi_row_source){.body_a = p->grab.hold.body, .body_b = HAPI_SLOT_NONE, .pointer = true};
   solver->apart = false;
   ++solver->row_count;
   hapi_row_ready(solver, index);

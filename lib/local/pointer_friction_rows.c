@@ -84,6 +84,12 @@ static bool add_friction_row(double period, const hapi_local_contact *contact,
   hapi_row *row = &solver->rows[number];
   hapi_pointer_spring p;
   HAPI_ASSERT_INDEX(number, rows->capacity);
+  /* Before the row: as in pointer_rows.c. */
+  rows->sources[number] = (hapi_row_source){.contact = at->index,
+                                            .body_a = contact->body,
+                                            .body_b = HAPI_SLOT_NONE,
+                                            .part = (uint8_t)(1 + axis),
+                                            .pointer = true};
   set_friction_columns(contact, at, f, f->axes[axis], row);
   fill_friction_spring(at, f, f->axes[axis], row, &p);
   row->mu = contact->feel.mu;
@@ -102,11 +108,6 @@ static bool add_friction_row(double period, const hapi_local_contact *contact,
   } else if (!hapi_spring_soften(row, at->pointer, &p, period)) {
     return false;
   }
-  rows->sources[number] = (hapi_row_source){.contact = at->index,
-                                            .body_a = contact->body,
-                                            .body_b = HAPI_SLOT_NONE,
-                                            .part = (uint8_t)(1 + axis),
-                                            .pointer = true};
   if (at->pointer->rigid) {
     hapi_spring_set_staying(period, at, &p, p.depth / period, &rows->sources[number]);
   }

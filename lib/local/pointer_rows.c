@@ -331,6 +331,9 @@ static void add_row(double period, hapi_local_contact *contact, const hapi_place
     p.depth *= at->depth > 0.0 ? contact->ramp.share : 1.0;
     ++at->pointer->rigid_move.near_rows;
   }
+  /* Before the row: where it is not wanted after all, the contact that had its place sees it. */
+  rows->sources[number] = (hapi_row_source){
+      .contact = at->index, .body_a = contact->body, .body_b = HAPI_SLOT_NONE, .pointer = true};
   set_columns(contact, at, row, &p);
   hapi_spring_note(rows, of, hapi_touch_stiffness(contact, of), p.a);
   bool pushes = at->pointer->coupling.integration == HAP_INTEGRATION_EXPLICIT
@@ -346,8 +349,6 @@ static void add_row(double period, hapi_local_contact *contact, const hapi_place
   row->single = !at->pointer->proxied;
   row->normal = -1;
   row->impulse = period * -hapi_v3_dot(contact->force, at->normal);
-  rows->sources[number] = (hapi_row_source){
-      .contact = at->index, .body_a = contact->body, .body_b = HAPI_SLOT_NONE, .pointer = true};
   if (at->pointer->rigid) {
     hapi_spring_set_staying(period, at, &p, fmin(p.depth, 0.0) / period, &rows->sources[number]);
   }
@@ -505,7 +506,7 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
       placed = !facts->faulted && pointer_place(touches, c, facts->period, &at, sample);
     }
     c->row = HAPI_NO_ROW;
-    touches->close += c->tool == 0 && c->ramp.depth > -CLOSE;
+    touches->close += c->tool == 0 && c->ramp.depth > -CLOSE && hapi_touch_has_shape(c);
     if (placed && pointers->grabs) {
       double touches_by = hapi_held_touches_by(at.pointer, c);
       at.share *= touches_by;

@@ -20,7 +20,7 @@ static bool shape_distance(const hapi_touches *touches, const hapi_local_contact
 {
   hapi_touch_frame frame = {NULL, NULL};
   hapi_nearest nearest;
-  if (!c->asked.has && c->asked.shape.kind != HAPI_SHAPE_PLANE) {
+  if (!hapi_touch_has_shape(c)) {
     return false;
   }
   if (c->asked.told.count > 0) {
@@ -98,21 +98,43 @@ static bool goes_before(const hapi_local_contact *a, const hapi_local_contact *b
   return a->ramp.depth > b->ramp.depth || (a->ramp.depth == b->ramp.depth && a < b);
 }
 
+/* Of a sphere, near its pointer. */
+static bool is_near(const hapi_local_contact *c, const hapi_pointers *pointers)
+{
+  return c->placed && c->tool == 0 &&
+         c->ramp.depth > -REACH * pointers->of[c->pointer].shape.radius;
+}
+
+/* Those that may hide others, by their next_hider; returns the first one. What is deeper than a
+ * contact that is near is near as well. */
+static uint32_t hiders_list(const hapi_pointers *pointers, const hapi_touches *touches)
+{
+  uint32_t first = HAPI_SLOT_NONE;
+  for (uint32_t i = touches->count; i > 0; --i) {
+    hapi_local_contact *c = &touches->of[i - 1];
+    if (hapi_touch_has_shape(c) && is_near(c, pointers)) {
+      c->next_hider = first;
+      first = i - 1;
+    }
+  }
+  return first;
+}
+
 void hapi_seams_hide(const hapi_tick_facts *facts, const hapi_pointers *pointers,
                      const hapi_bodies *bodies, const hapi_touches *touches)
 {
+  uint32_t first = hiders_list(pointers, touches);
   for (uint32_t i = 0; i < touches->count; ++i) {
     hapi_local_contact *c = &touches->of[i];
     const hapi_pointer *p = &pointers->of[c->pointer];
-    double least = -REACH * p->shape.radius;
     c->hidden = c->is_hidden;
-    if (!c->placed || c->tool != 0 || !(c->ramp.depth > least)) {
+    if (first == HAPI_SLOT_NONE || !is_near(c, pointers)) {
       continue;
     }
-    for (uint32_t k = 0; k < touches->count && !c->hidden; ++k) {
+    for (uint32_t k = first; k != HAPI_SLOT_NONE && !c->hidden; k = touches->of[k].next_hider) {
       const hapi_local_contact *by = &touches->of[k];
-      if (k != i && by->placed && by->tool == 0 && by->pointer == c->pointer &&
-          goes_before(by, c) && contact_hides(touches, by, c, p, bodies)) {
+      if (k != i && by->pointer == c->pointer && goes_before(by, c) &&
+          contact_hides(touches, by, c, p, bodies)) {
         c->hidden = true;
         friction_hand_over(facts, p, bodies, touches, c, by);
       }

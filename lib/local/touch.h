@@ -90,13 +90,14 @@ typedef struct hapi_local_contact {
   uint32_t pointer;
   uint32_t pointer_generation;
   uint32_t generation;
-  uint32_t epoch; /* of the body, when the model came */
-  uint32_t tool;  /* of a hull: 1 + index into the tools; 0: of a sphere */
-  uint32_t row;   /* model CONTACT: in this tick, HAPI_NO_ROW */
-  bool seen;      /* rendered at least once */
-  bool placed;    /* in this tick, where pointers touch several things */
-  bool hidden;    /* in this tick: the surface goes on behind it, see seams.h */
-  bool is_hidden; /* by what the model says; for shapes that the loop does not ask */
+  uint32_t epoch;      /* of the body, when the model came */
+  uint32_t tool;       /* of a hull: 1 + index into the tools; 0: of a sphere */
+  uint32_t row;        /* model CONTACT: in this tick, HAPI_NO_ROW */
+  uint32_t next_hider; /* scratch of seams.c */
+  bool seen;           /* rendered at least once */
+  bool placed;         /* in this tick, where pointers touch several things */
+  bool hidden;         /* in this tick: the surface goes on behind it, see seams.h */
+  bool is_hidden;      /* by what the model says; for shapes that the loop does not ask */
 
   double point_body[3];
   double normal_body[3];
@@ -213,7 +214,7 @@ typedef struct hapi_touches {
   hapi_local_contact *of; /* of spheres, then of hulls; count in all */
   uint32_t count;
   uint32_t pushing;         /* that push in this tick */
-  uint32_t close;           /* spheres' that touched in the last tick, or nearly */
+  uint32_t close;           /* spheres' with shapes that touched in the last tick, or nearly */
   bool rubs;                /* some contact rubs */
   hapi_kept_touch *kept;    /* capacity.contacts */
   hapi_friction *frictions; /* by contact slot; of spheres */
@@ -230,6 +231,12 @@ typedef struct hapi_touches {
   double hand_impulse[3];   /* N s on dynamic bodies, all pointers */
   double hand_impulse_abs;
 } hapi_touches;
+
+/* Whether the contact has a shape that can be asked: others hide nothing, and are not hidden. */
+static inline bool hapi_touch_has_shape(const hapi_local_contact *c)
+{
+  return c->asked.has || c->asked.shape.kind == HAPI_SHAPE_PLANE;
+}
 
 /* What is kept of the contact. */
 static inline hapi_friction *hapi_friction_of(const hapi_touches *touches,

@@ -121,6 +121,14 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, boo
  * with another target. */
 void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count);
 
+/* The same of a triple of which the targets are those of that run as well, and which moves both
+ * bodies or is single: nothing of its rows is looked at. */
+static inline void hapi_contact_stands(hapi_solver *solver, bool by_mass)
+{
+  solver->packs.known.ready += by_mass;
+  solver->owes = true;
+}
+
 /* [haptic] Rows of the last run are in another place than there. */
 static inline void hapi_contact_moved(hapi_solver *solver)
 {

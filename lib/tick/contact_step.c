@@ -9,6 +9,7 @@
 #include "local/body_draw.h"
 #include "local/body_stay.h"
 #include "local/body_step.h"
+#include "local/body_still.h"
 #include "local/brace_rows.h"
 #include "local/contact_rows.h"
 #include "local/grab_place.h"
@@ -16,6 +17,7 @@
 #include "local/gyro.h"
 #include "local/pointer_forces.h"
 #include "local/pointer_rows.h"
+#include "local/still_islands.h"
 #include "local/tool_place.h"
 #include "pointer/proxy.h"
 #include "pointer/rigid_proxy.h"
@@ -30,6 +32,8 @@
 #define TURN_MAX 0.05     /* rad a substep of the gyroscopic motion */
 #define TURN_SUBSTEPS 100 /* at most, a tick */
 
+#define STILL_EVERY 16 /* ticks: islands that stand still are looked for */
+
 #define COARSE_REST 1e-12 /* J a body, of a sweep's corrections that stay undone in a tick */
 #define COARSE_MOST 1e-10 /* the most, under a hand */
 #define COARSE_FADE 0.98  /* a tick */
@@ -38,18 +42,45 @@
 
 static void body_begin(hapi_local_body *body, const hapi_patches *patches)
 {
-  HAPI_ASSERT_UNIT_QUAT(body->pose.quat_wxyz);
-  hapi_quat_to_matrix(body->pose.quat_wxyz, body->rotation);
-  memcpy(body->start_twist, &body->twist, sizeof body->start_twist);
   body->flags &= ~(uint32_t)HAPI_BODY_TOUCHED;
   /* A body that came into the range moves on with its twist until the contact thread has seen it:
    * without its contacts it would fall through the floor. */
   body->waiting = (body->flags & HAPI_BODY_OWNED) != 0 && body->entered_model != 0 &&
                   (patches == NULL || patches->model_number < body->entered_model);
   body->rowed = false;
-  if (!body->round && (body->flags & (HAPI_BODY_DRIVEN | HAPI_BODY_MEASURED)) == 0) {
-    hapi_m3_turn(body->rotation, body->given.inverse_inertia, body->inverse_inertia);
+}
+
+/* Of one that moves, or may. stays: there are contacts whose rows may be kept. */
+static void body_begin_awake(hapi_bodies *bodies, hapi_local_body *body, bool stays, double period,
+                             hapi_solver *solver)
+{
+  HAPI_ASSERT_UNIT_QUAT(body->pose.quat_wxyz);
+  memcpy(body->start_twist, &body->twist, sizeof body->start_twist);
+  hapi_body_place(body);
+  if (stays) {
+    hapi_stay_follow(bodies, body);
+    hapi_still_follow(body);
+    bodies->quiet += hapi_still_is_quiet(body, period);
+  } else {
+    hapi_stay_end(body);
+    body->stay.still.quiet = 0;
   }
+  hapi_body_free_velocity(body, period, solver->v[body->row]);
+  memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
+  bodies->resting += (body->flags & HAPI_BODY_RESTING) != 0;
+}
+
+/* Of one that stands still; false: not any more. */
+static bool body_begin_still(hapi_local_body *body, double period, hapi_solver *solver)
+{
+  const hapi_body_still *still = &body->stay.still;
+  if (still->island == 0 || !hapi_still_holds(body, period)) {
+    return false;
+  }
+  body->flags |= still->touched ? (uint32_t)HAPI_BODY_TOUCHED : 0u;
+  memcpy(solver->v[body->row], still->free, sizeof solver->v[0]);
+  memcpy(solver->free[body->row], still->free, sizeof solver->free[0]);
+  return true;
 }
 
 static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_rows *rows,
@@ -62,7 +93,8 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   hapi_solver_clear(solver);
   solver->apart = true;
   rows->hand = HUGE_VAL;
-  bodies->resting = 0;
+  bodies->resting = bodies->quiet = 0;
+  bool stays = patches != NULL && patches->contact_count > 0;
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     HAPI_ASSERT_INDEX(bodies->live[i], bodies->high);
@@ -72,10 +104,10 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
     }
     body_begin(body, patches);
     body->row = solver->body_count++;
-    hapi_stay_follow(bodies, body);
-    hapi_body_free_velocity(body, facts->period, solver->v[body->row]);
-    memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
-    bodies->resting += (body->flags & HAPI_BODY_RESTING) != 0;
+    if (!body_begin_still(body, facts->period, solver)) {
+      hapi_still_end(bodies, body);
+      body_begin_awake(bodies, body, stays, facts->period, solver);
+    }
   }
 }
 
@@ -170,6 +202,9 @@ static void bodies_step(hapi_bodies *bodies, const hapi_rows *rows, const hapi_t
   uint32_t count = 0;
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
+    if (hapi_body_is_still(body)) {
+      continue;
+    }
     if ((body->flags & HAPI_BODY_OWNED) == 0) { /* others have none */
       memset(body->linear.residual, 0, sizeof body->linear.residual);
     }
@@ -202,7 +237,7 @@ static void bodies_take_velocities(const hapi_bodies *bodies, const hapi_rows *r
 {
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
-    if (hapi_body_responds(body)) {
+    if (hapi_body_responds(body) && !hapi_body_is_still(body)) {
       body_take_velocity(body, rows->solver.v[body->row]);
       if (body_wobbles(body, wishes)) {
         hapi_gyro_follow(body);
@@ -292,11 +327,17 @@ static inline uint32_t account_contact(const hapi_rows *rows, hapi_bodies *bodie
   HAPI_ASSERT_INDEX(source->contact, contacts->memory_count);
   HAPI_ASSERT(source->part == 0 && source->count > 0);
   double *impulse = contacts->memory[source->contact].impulse;
-  bool pushes = false;
-  for (uint32_t i = 0; i < source->count; ++i) {
-    HAPI_ASSERT_INDEX(source[i].part, 3);
-    impulse[source[i].part] = row[i].impulse;
-    pushes = pushes || row[i].impulse != 0.0;
+  bool pushes = row->impulse != 0.0;
+  impulse[0] = row->impulse;
+  if (source->count == 3) { /* nearly all */
+    HAPI_ASSERT(source[1].part == 1 && source[2].part == 2);
+    impulse[1] = row[1].impulse;
+    impulse[2] = row[2].impulse;
+    pushes = pushes || row[1].impulse != 0.0 || row[2].impulse != 0.0;
+  } else if (source->count == 2) {
+    HAPI_ASSERT_INDEX(source[1].part, 3);
+    impulse[source[1].part] = row[1].impulse;
+    pushes = pushes || row[1].impulse != 0.0;
   }
   contacts->active += row->impulse > 0.0;
   if (pushes) {
@@ -317,7 +358,7 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
                          const hapi_joints *joints, bool observes)
 {
   const hapi_solver *solver = &rows->solver;
-  contacts->active = 0;
+  contacts->active = contacts->still_active;
   HAPI_ASSERT(solver->row_count <= rows->capacity);
   for (uint32_t i = 0; i < solver->row_count;) {
     const hapi_row *row = &solver->rows[i];
@@ -525,6 +566,9 @@ static void rows_make(hapi_tick *tick)
     hapi_joint_rows(&tick->joints, &tick->bodies, rows, &tick->facts);
     hapi_effect_end(sample, HAP_EFFECT_JOINTS, begin);
   }
+  if (tick->bodies.still > 0) {
+    hapi_still_check(&tick->contacts, &tick->bodies, rows, &tick->facts);
+  }
   if (patches != NULL && patches->contact_count > 0) {
     uint64_t begin = hapi_effect_begin(sample);
     hapi_contact_rows(&tick->contacts, &tick->bodies, rows, &tick->facts, sample);
@@ -584,6 +628,9 @@ void hapi_contact_step(hapi_tick *tick)
     hapi_effect_end(&tick->sample, HAP_EFFECT_PROXY, begin);
   }
   rows_account(&tick->rows, &tick->bodies, &tick->contacts, &tick->joints, tick->facts.observes);
+  if (tick->bodies.quiet > 0 && tick->facts.tick % STILL_EVERY == 0) {
+    hapi_still_find(&tick->contacts, &tick->bodies, &tick->rows, &tick->facts);
+  }
   if (pointers->pushes) {
     const hapi_own_pushing at = hapi_tick_pushing(tick);
     hapi_own_push_account(&at);

@@ -9,6 +9,7 @@
 #include "base/pointer_id.h"
 #include "base/pose.h"
 #include "base/vec.h"
+#include "local/body_still.h"
 #include "local/touch_place.h"
 
 #define RELEASE_NS 5000000 /* without force: a touch is over, and not a bounce of noise */
@@ -570,29 +571,52 @@ static bool pair_finish(const pressing_pair *pair, hap_body_contact *out)
   return true;
 }
 
-/* The rows of a contact follow each other, and so do the contacts of a pair. */
-uint32_t hapi_telling_contacts(const hapi_tick *tick, hap_body_contact *out, uint32_t capacity)
+/* N, on the first body of the contact of that index: of its rows, which begin at *io_row or behind
+ * it, or while it is still of those that it had. False: it has none. */
+static bool contact_force(const hapi_tick *tick, uint32_t index, uint32_t *io_row, double out[3])
 {
   const hapi_solver *solver = &tick->rows.solver;
-  hapi_patch_contact *contacts =
-      tick->contacts.patches != NULL ? hapi_patches_contacts(tick->contacts.patches) : NULL;
+  const hapi_row_source *sources = tick->rows.sources;
+  const hapi_contact_memory *memory = &tick->contacts.memory[index];
+  double per_s = 1.0 / tick->facts.period;
+  uint32_t i = *io_row;
+  while (i < solver->row_count && (sources[i].pointer || sources[i].joint)) {
+    ++i;
+  }
+  *io_row = i;
+  hapi_v3_set(out, 0.0, 0.0, 0.0);
+  if (i < solver->row_count && sources[i].contact == index) {
+    for (; i < solver->row_count && sources[i].contact == index; ++i) {
+      hapi_v3_madd(out, per_s * solver->rows[i].impulse, solver->rows[i].ja, out);
+    }
+    *io_row = i;
+    return true;
+  }
+  if (memory->kept.what != HAPI_KEPT_ROWS ||
+      !hapi_contact_is_still(&memory->kept, hapi_bodies_at(&tick->bodies, memory->kept.body_a),
+                             hapi_bodies_at(&tick->bodies, memory->kept.body_b))) {
+    return false;
+  }
+  hapi_v3_scale(per_s, memory->held, out);
+  return true;
+}
+
+/* The rows of contacts are in the order of these, and the contacts of a pair follow each other. */
+uint32_t hapi_telling_contacts(const hapi_tick *tick, hap_body_contact *out, uint32_t capacity)
+{
+  const hapi_patches *patches = tick->contacts.patches;
   pressing_pair pair = {.weight = 0.0};
   uint32_t surface = HAPI_SLOT_NONE;
   uint32_t count = 0;
-  if (contacts == NULL || tick->facts.model != HAP_MODEL_CONTACT) {
+  uint32_t row = 0;
+  if (patches == NULL || tick->facts.model != HAP_MODEL_CONTACT) {
     return 0;
   }
-  for (uint32_t i = 0; i < solver->row_count && count < capacity;) {
-    const hapi_row_source *source = &tick->rows.sources[i];
-    if (source->pointer || source->joint) {
-      ++i;
+  for (uint32_t i = 0; i < patches->contact_count && count < capacity; ++i) {
+    const hapi_patch_contact *in = &hapi_patches_contacts(tick->contacts.patches)[i];
+    double force[3];
+    if (!contact_force(tick, i, &row, force)) {
       continue;
-    }
-    const hapi_patch_contact *in = &contacts[source->contact];
-    double force[3] = {0.0, 0.0, 0.0};
-    for (; i < solver->row_count && tick->rows.sources[i].contact == source->contact; ++i) {
-      const hapi_row *row = &solver->rows[i];
-      hapi_v3_madd(force, row->impulse / tick->facts.period, row->ja, force);
     }
     if (in->surface != surface) {
       count += pair_finish(&pair, &out[count]);

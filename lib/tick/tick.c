@@ -108,6 +108,7 @@ void hapi_tick_reset(hapi_tick *tick)
   touches->tool.capacity = tick->capacity.tool_points;
   tick->contacts.patches = NULL;
   tick->contacts.rowed_tick = 0;
+  tick->contacts.still_active = 0;
   tick->contacts.memory_count = tick->contacts.buckets_used = tick->contacts.active = 0;
   tick->joints.count = tick->joints.told = 0;
   tick->rows.residual_max = 0.0;

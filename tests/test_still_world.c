@@ -1,0 +1,158 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Two stacks under a hand, as a session runs them: once with islands that stand still, and once
+ * with all of them awake. Whatever the hand, the application and the world do, both go the same
+ * way. */
+
+#include "tests/tap.h"
+
+#include "haptic/haptic_internal.h"
+#include "local/body_still.h"
+#include "session/session_internal.h"
+#include "tests/contact_world.h"
+
+#define EDGE 0.05
+#define LAYER 1e-4
+#define HIGH 3      /* cubes of a stack */
+#define APART 0.055 /* the loop has both */
+/* What is left undone in a tick, and how far the runs may so be apart. */
+typedef struct still_case {
+  double mu;
+  double accuracy;
+  double apart; /* m */
+  double force; /* share of it */
+} still_case;
+
+enum {
+  REST,
+  PUSH,
+  BACK,
+  REST_AGAIN,
+  HEAVIER,
+  ADDED,
+  GONE,
+  PUSH_AGAIN,
+  PHASES
+};
+
+static const int ticks_of[PHASES] = {700, 400, 300, 700, 500, 700, 500, 1000};
+
+typedef struct run_result {
+  double position[PHASES][CW_TRACED_MAX][3]; /* at the end of each */
+  double force[PHASES];                      /* N, mean of its size */
+  uint32_t still[PHASES];                    /* bodies, at the end */
+  uint32_t still_of_second;                  /* in PUSH, at the least */
+} run_result;
+
+static void stacks_build(contact_world *w, double mu)
+{
+  w->surface.mu = mu;
+  dWorldSetContactSurfaceLayer(w->world, LAYER);
+  cw_add_floor(w);
+  for (int i = 0; i < 2 * HIGH; ++i) {
+    const int stack = i / HIGH;
+    (void)cw_add_cube(w, 0.3, EDGE, 0.0, APART * stack,
+                      EDGE / 2 - LAYER / 2 + (EDGE - LAYER / 2) * (i % HIGH));
+  }
+}
+
+static void phase_begin(contact_world *w, int phase)
+{
+  cw_move_hand(w, 0.0, 0.0, 0.0);
+  if (phase == PUSH || phase == PUSH_AGAIN) {
+    cw_move_hand(w, 0.05, 0.0, 0.0);
+  } else if (phase == BACK) {
+    cw_move_hand(w, -0.1, 0.0, 0.0);
+  } else if (phase == HEAVIER || phase == ADDED || phase == GONE) {
+    REQUIRE(hap_session_lock(w->session) == HAP_OK);
+    if (phase == HEAVIER) {
+      dWorldSetGravity(w->world, 0.0, 0.0, -1.5 * CW_GRAVITY);
+    } else if (phase == ADDED) { /* it falls onto the second stack */
+      (void)cw_add_cube(w, 0.1, EDGE, 0.005, APART, EDGE * (HIGH + 0.5) + 0.02);
+    } else { /* which it left */
+      CHECK(hap_session_forget_body(w->session, w->bodies[2 * HIGH]) == HAP_OK);
+      dGeomDestroy(dBodyGetFirstGeom(w->bodies[2 * HIGH]));
+      dBodyDestroy(w->bodies[2 * HIGH]);
+      w->bodies[--w->body_count] = NULL;
+    }
+    hap_session_unlock(w->session);
+  }
+}
+
+/* The bodies of the second stack that stand still. */
+static uint32_t second_still(const contact_world *w)
+{
+  const hapi_bodies *bodies = &w->session->haptic->tick.bodies;
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    const hapi_local_body *body = &bodies->of[bodies->live[i]];
+    count += hapi_body_is_still(body) && body->pose.position[1] > 0.5 * APART;
+  }
+  return count;
+}
+
+static void world_run(const still_case *what, bool awake, run_result *out)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  memset(out, 0, sizeof *out);
+  stacks_build(w, what->mu);
+  w->def.accuracy = what->accuracy;
+  cw_start(w, -0.05, 0.0, EDGE * 2.5);
+  out->still_of_second = UINT32_MAX;
+  for (int phase = 0; phase < PHASES; ++phase) {
+    hapi_tick *tick = &w->session->haptic->tick;
+    phase_begin(w, phase);
+    for (int i = 0; i < ticks_of[phase]; ++i) {
+      tick->bodies.never_still = awake;
+      cw_tick(w);
+      out->force[phase] += cw_norm(w->force) / ticks_of[phase];
+      if (phase == PUSH && second_still(w) < out->still_of_second) {
+        out->still_of_second = second_still(w);
+      }
+    }
+    out->still[phase] = tick->bodies.still;
+    memcpy(out->position[phase], w->position, sizeof w->position);
+  }
+  CHECK(cw_stats(w).faults.count == 0);
+}
+
+static void runs_compare(const still_case *what)
+{
+  run_result still;
+  run_result awake;
+  world_run(what, false, &still);
+  world_run(what, true, &awake);
+  for (int phase = 0; phase < PHASES; ++phase) {
+    double apart = 0.0;
+    for (int i = 0; i < 2 * HIGH; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        apart = fmax(apart, fabs(still.position[phase][i][k] - awake.position[phase][i][k]));
+      }
+    }
+    printf("# mu %g, phase %d: %u still, apart by %.2g m, force %.9g and %.9g N\n", what->mu, phase,
+           still.still[phase], apart, still.force[phase], awake.force[phase]);
+    CHECK(awake.still[phase] == 0);
+    CHECK(apart < what->apart);
+    CHECK_NEAR(still.force[phase], awake.force[phase], what->force * awake.force[phase]);
+  }
+  CHECK(awake.force[PUSH] > 0.05 && awake.force[PUSH_AGAIN] > 0.05);
+  CHECK(still.still[REST] == 2 * HIGH);
+  CHECK(still.still_of_second == HIGH); /* the hand pushes the first stack alone */
+}
+
+TEST(solved_to_the_end_both_go_the_same_way)
+{
+  static const still_case rough = {0.5, 1.0, 1e-6, 1e-5};
+  static const still_case slippery = {0.1, 1.0, 5e-9, 1e-6};
+  runs_compare(&rough);
+  runs_compare(&slippery);
+}
+
+TEST(else_they_are_as_far_apart_as_the_solver_lets_them)
+{
+  static const still_case rough = {0.5, 0.5, 1e-5, 5e-4};
+  static const still_case slippery = {0.1, 0.5, 1e-5, 5e-4};
+  runs_compare(&rough);
+  runs_compare(&slippery);
+}
