@@ -15,9 +15,10 @@
 #define DEAR_RUNS 32u
 #define CALM_UPDATES 4000u /* row updates of hapi_solver_sweep_on, and two sweeps */
 
-/* A direct solve that costs more than this is in vain when it leads to nothing better. After so
- * many such runs, one after the other, direct solves rest, and all of the budget is for sweeps. The
- * rest doubles each time that the next one is in vain as well. */
+/* A direct solve that costs more than this, or makes a run longer than enough, is in vain when it
+ * leads to nothing better. After so many such runs, one after the other, direct solves rest, and
+ * all of the budget is for sweeps. Of costly ones the rest doubles each time that the next one is in
+ * vain as well. */
 #define VAIN_COST 4000u /* row updates */
 #define VAIN_RUNS 4u
 #define VAIN_REST 16u
@@ -28,6 +29,12 @@
 #define DIRECT_SWEEPS 10u
 #define PACKED_SWEEPS 12u /* where contacts are in packs, not before so many */
 #define RATE_MOST 0.99    /* of sweeps that lead nowhere */
+
+/* A run that has taken enough may leave so many times `coarse`, which is four times the drift of
+ * the force. It makes no direct solve where so many times the sweeps that one costs will do: the
+ * next runs make them. */
+#define LEAVE 16.0
+#define LEAVE_SWEEPS 3u
 
 /* ---- preparation ---- */
 
@@ -615,12 +622,14 @@ static void note_vain(hapi_solver *solver, uint32_t dearest)
   if (dearest == 0) {
     return;
   }
-  if (solver->direct_solves > 0 || dearest <= VAIN_COST) {
+  bool costly = dearest > VAIN_COST;
+  bool over = solver->enough > 0 && solver->updates > solver->enough;
+  if (solver->direct_solves > 0 || (!costly && !over)) {
     solver->rest.vain = 0;
     return;
   }
   if (++solver->rest.vain >= VAIN_RUNS && solver->rest.rows == 0) {
-    uint32_t again = solver->rest.vain - VAIN_RUNS;
+    uint32_t again = costly ? solver->rest.vain - VAIN_RUNS : 0;
     uint32_t rest = again < 8 ? VAIN_REST << again : VAIN_REST_MOST;
     solver->rest.rows = solver->row_count;
     solver->rest.runs = rest < VAIN_REST_MOST ? rest : VAIN_REST_MOST;
@@ -684,16 +693,34 @@ static double sweeps_rate(double before2, double before, double now)
   return rate < RATE_MOST ? rate : RATE_MOST;
 }
 
-/* Whether as many sweeps as a direct solve costs will do, where something may stay undone. */
-static bool sweeps_suffice(const hapi_solver *solver, double rate)
+/* Whether so many times the sweeps that a direct solve costs will do, where something may stay
+ * undone. */
+static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t times)
 {
   double share = 1.0;
-  uint32_t sweeps = DIRECT_SWEEPS * solver->row_count / sweep_cost(solver);
+  uint32_t sweeps = times * DIRECT_SWEEPS * solver->row_count / sweep_cost(solver);
   for (uint32_t i = 0; i < sweeps; ++i) {
     share *= rate;
   }
   return share * solver->residual < HAPI_COARSE &&
          share * share * solver->corrected < solver->coarse;
+}
+
+/* Whether what is due is little enough for the next run. tried: direct solves lead to nothing
+ * better now. */
+static bool may_leave(const hapi_solver *solver, bool tried)
+{
+  return solver->enough > 0 && solver->coarse > 0.0 && solver->residual < HAPI_COARSE &&
+         (tried || solver->corrected < LEAVE * solver->coarse);
+}
+
+/* Whether one more direct solve is worth its cost. */
+static bool direct_pays(const hapi_solver *solver, double rate, bool first, bool tried)
+{
+  bool fits = solver->updates + solver->direct.cost <= solver->enough;
+  return !sweeps_suffice(solver, rate, 1) &&
+         (fits || !may_leave(solver, tried) ||
+          (first && !sweeps_suffice(solver, rate, LEAVE_SWEEPS)));
 }
 
 /* It goes by rows. */
@@ -721,6 +748,7 @@ void hapi_solver_run(hapi_solver *solver)
   bool may = solver->direct_rows > 0;
   bool dear = may && stays_dear(solver);
   bool direct = may && !dear;
+  bool tried = dear;
   uint32_t dearest = 0;
   sweep_way way = {0};
   solver->packs.in_use = false;
@@ -732,6 +760,9 @@ void hapi_solver_run(hapi_solver *solver)
     return;
   }
   solver->packs.in_use = hapi_packs_begin(&solver->packs, solver->rows, rows, solver->body_count);
+  if (hapi_packs_are_high(&solver->packs)) {
+    solver->enough = 0; /* sweeps from tick to tick would not do */
+  }
   if (solver->owes) {
     triples_start(solver);
   }
@@ -753,25 +784,30 @@ void hapi_solver_run(hapi_solver *solver)
     double rate = sweeps_rate(before[1], before[0], solver->corrected);
     before[1] = before[0];
     before[0] = solver->corrected;
+    bool enough = solver->updates >= solver->enough && may_leave(solver, tried);
     if (is_settled(solver) ||
-        (solver->sweeps >= 2 && (left < cost || solver->sweeps == solver->max_sweeps))) {
+        (solver->sweeps >= 2 && (enough || left < cost || solver->sweeps == solver->max_sweeps))) {
       break;
     }
     /* Direct solves may have one half of the budget: where they lead in circles between two sets of
      * active rows, sweeps from the second half still come near, and the next tick starts from
      * there. */
     if (direct && solver->sweeps >= direct_from && 2 * left > solver->update_budget &&
-        !sweeps_suffice(solver, rate) && (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
+        direct_pays(solver, rate, dearest == 0, tried) &&
+        (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
+      uint32_t accepted = solver->direct_solves;
       uint32_t spent = direct_run(solver, (uint32_t)left - cost);
       updates_spend(solver, &left, spent);
+      solver->direct.cost = spent;
+      tried = tried || solver->direct_solves == accepted;
       way.begun = false;
       before[0] = before[1] = 0.0;
       bool first = dearest == 0;
       dearest = spent > dearest ? spent : dearest;
-      direct = solver->direct_end != HAPI_DIRECT_DEAR; /* now, and so in the next round */
-      const bool reduced = solver->direct_end == HAPI_DIRECT_REDUCED;
-      if (direct && solver->direct_residual < (reduced ? HAPI_UNSOLVED : solver->tolerance)) {
-        solver->residual = solver->direct_residual;
+      direct = solver->direct.end != HAPI_DIRECT_DEAR; /* now, and so in the next round */
+      const bool reduced = solver->direct.end == HAPI_DIRECT_REDUCED;
+      if (direct && solver->direct.residual < (reduced ? HAPI_UNSOLVED : solver->tolerance)) {
+        solver->residual = solver->direct.residual;
         break;
       }
       if (!direct && first) {

@@ -337,7 +337,7 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
                       uint32_t body_count)
 {
   if (packs->work == NULL || body_count > packs->body_capacity || row_count < 3 * PACKABLE_LEAST) {
-    packs->count = 0;
+    packs->count = packs->height = 0;
     return false;
   }
   if (packs_stand(packs, row_count, body_count)) {
@@ -369,6 +369,11 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
   packs->known.filled = packs->known.made;
   packs->known.held = packs->known.ready;
   return true;
+}
+
+bool hapi_packs_are_high(const hapi_packs *packs)
+{
+  return packs->height > HEIGHT_MOST;
 }
 
 void hapi_packs_store(const hapi_packs *packs, hapi_row *rows)

@@ -33,6 +33,13 @@
 #define COARSE_MOST 1e-12 /* J a body, of a sweep's corrections that stay undone in a tick */
 #define COARSE_FADE 0.98  /* a tick */
 
+/* A tick may take twice as long as usual, or what is done within 20 us. What its solves leave undone
+ * then, they leave to the next ticks. */
+#define ENOUGH_LEAST 1500.0 /* row updates */
+#define ENOUGH_SHARE 2.0
+#define ROW_KEPT 2.0     /* row updates, that a row costs besides: most are kept */
+#define USUAL_STEP 0.005 /* a tick: doubles in 140 of them */
+
 /* ---- bodies ---- */
 
 static void body_begin(hapi_local_body *body, const hapi_patches *patches)
@@ -406,6 +413,27 @@ static void rows_set_coarse(hapi_rows *rows, bool reaches)
   rows->solver.coarse = rows->touched ? hapi_min(before, most) : most;
 }
 
+/* Row updates of this tick, without the making of rows. */
+static double work_counted(const hapi_rows *rows)
+{
+  return (double)rows->work.done -
+         ((double)HAPI_ROW_MAKING - ROW_KEPT) * (double)rows->solver.row_count;
+}
+
+/* Row updates, of the next solve. */
+static uint32_t rows_enough(const hapi_rows *rows)
+{
+  double most = hapi_max(ENOUGH_SHARE * rows->work.usual, ENOUGH_LEAST);
+  return (uint32_t)hapi_max(most - work_counted(rows), 1.0);
+}
+
+/* After the last solve of a tick. It follows the median, whatever single ticks take. */
+static void rows_note_usual(hapi_rows *rows)
+{
+  double usual = hapi_max(rows->work.usual, 1.0);
+  rows->work.usual = usual * (work_counted(rows) > usual ? 1.0 + USUAL_STEP : 1.0 - USUAL_STEP);
+}
+
 static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
 {
   hapi_solver *solver = &rows->solver;
@@ -414,6 +442,7 @@ static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
   uint32_t most = solver->update_budget;
   uint64_t left = work->most > work->done ? work->most - work->done : 0;
   solver->update_budget = work->most > 0 && left < most ? (uint32_t)left : most;
+  solver->enough = solver->coarse > 0.0 ? rows_enough(rows) : 0;
   hapi_solver_run(solver);
   hapi_solver_calm(solver);
   solver->update_budget = most;
@@ -564,6 +593,7 @@ void hapi_contact_step(hapi_tick *tick)
     bodies_take_velocities(&tick->bodies, &tick->rows, tick->facts.wishes);
   }
   rows_note_unsolved(&tick->rows);
+  rows_note_usual(&tick->rows);
   tick->rows.work.all += tick->rows.work.done;
   hapi_pointer_forces(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->rows,
                       &tick->sample);
