@@ -718,9 +718,10 @@ static bool may_leave(const hapi_solver *solver, bool tried)
 static bool direct_pays(const hapi_solver *solver, double rate, bool first, bool tried)
 {
   bool fits = solver->updates + solver->direct.cost <= solver->enough;
+  bool cheap = solver->direct.cost <= VAIN_COST;
   return !sweeps_suffice(solver, rate, 1) &&
          (fits || !may_leave(solver, tried) ||
-          (first && !sweeps_suffice(solver, rate, LEAVE_SWEEPS)));
+          (first && cheap && !sweeps_suffice(solver, rate, LEAVE_SWEEPS)));
 }
 
 /* It goes by rows. */

@@ -36,9 +36,10 @@
 /* A tick may take twice as long as usual, or what is done within 20 us. What its solves leave undone
  * then, they leave to the next ticks. */
 #define ENOUGH_LEAST 1500.0 /* row updates */
-#define ENOUGH_SHARE 2.0
+#define ENOUGH_SHARE 1.5
 #define ROW_KEPT 2.0     /* row updates, that a row costs besides: most are kept */
-#define USUAL_STEP 0.005 /* a tick: doubles in 140 of them */
+#define USUAL_STEP 0.002 /* a tick: doubles in 140 of them */
+#define USUAL_ROW 4.0    /* row updates, at least for each row: kept, and swept twice */
 
 /* ---- bodies ---- */
 
@@ -427,11 +428,12 @@ static uint32_t rows_enough(const hapi_rows *rows)
   return (uint32_t)hapi_max(most - work_counted(rows), 1.0);
 }
 
-/* After the last solve of a tick. It follows the median, whatever single ticks take. */
+/* It follows the median, whatever single ticks take. */
 static void rows_note_usual(hapi_rows *rows)
 {
-  double usual = hapi_max(rows->work.usual, 1.0);
-  rows->work.usual = usual * (work_counted(rows) > usual ? 1.0 + USUAL_STEP : 1.0 - USUAL_STEP);
+  double usual = rows->work.usual;
+  usual *= work_counted(rows) > usual ? 1.0 + USUAL_STEP : 1.0 - USUAL_STEP;
+  rows->work.usual = hapi_max(usual, USUAL_ROW * (double)rows->solver.row_count);
 }
 
 static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
