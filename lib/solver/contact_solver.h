@@ -61,7 +61,7 @@ typedef struct hapi_solver {
   uint32_t update_budget; /* row updates in all sweeps and direct solves, these counted by their
                              cost; two sweeps are made in any case */
   uint32_t enough;      /* row updates, counted likewise: where `coarse` is above 0 and what is due
-                             is little, the rest is for the next run; 0: until it is settled */
+                           is little, the rest is for the next run; 0: until it is settled */
   uint32_t max_sweeps;  /* beyond two; 0: what update_budget allows */
   uint32_t direct_rows; /* islands of at most this many free rows are solved directly; 0: none */
   double *work;         /* for direct solves; an island that does not fit is left to sweeps */

@@ -347,7 +347,7 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
   if (!packs_hold(packs, rows, row_count, body_count)) {
     packs->known.row_count = row_count;
     packs->known.body_count = body_count;
-    packs->count = 0;
+    packs->count = packs->height = 0;
     units_find(packs, rows, row_count);
     if (packs->packable_count < PACKABLE_LEAST) {
       return false;

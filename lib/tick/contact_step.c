@@ -33,12 +33,12 @@
 #define COARSE_MOST 1e-12 /* J a body, of a sweep's corrections that stay undone in a tick */
 #define COARSE_FADE 0.98  /* a tick */
 
-/* A tick may take twice as long as usual, or what is done within 20 us. What its solves leave undone
- * then, they leave to the next ticks. */
+/* A tick whose solves have taken half as many row updates again as is usual, or what is done within
+ * 20 us, leaves the rest to the next ticks, where the rest is little. */
 #define ENOUGH_LEAST 1500.0 /* row updates */
 #define ENOUGH_SHARE 1.5
-#define ROW_KEPT 2.0     /* row updates, that a row costs besides: most are kept */
-#define USUAL_STEP 0.002 /* a tick: doubles in 140 of them */
+#define ROW_KEPT 2.0     /* row updates that a row costs besides: most are kept */
+#define USUAL_STEP 0.002 /* a tick: doubles in 350 of them */
 #define USUAL_ROW 4.0    /* row updates, at least for each row: kept, and swept twice */
 
 /* ---- bodies ---- */
