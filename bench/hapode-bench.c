@@ -82,8 +82,7 @@ static const program programs[] = {
      "hapode-run in real time, stopped by signals or beside busy loops, with the virtual device "
      "and "
      "a SPIDAR's emulator: force, steps, and what the guard does"},
-    {"tail", bench_tail,
-     "the slowest ticks of every scene, at rest and pushed; --scene NAME[:N]"},
+    {"tail", bench_tail, "the slowest ticks of every scene, at rest and pushed; --scene NAME[:N]"},
     {"tick", bench_tick,
      "the haptic loop alone: time of a tick; --scene NAME: of one case with contacts"},
 };

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* A solve that takes long leaves the rest to the next ticks: a row of ten cubes that is pushed along
- * the floor. */
+/* A solve that takes long leaves the rest to the next ticks: a row of ten cubes that is pushed
+ * along the floor. */
 
 #include "tests/tap.h"
 

@@ -17,8 +17,8 @@
 
 /* A direct solve that costs more than this, or makes a run longer than enough, is in vain when it
  * leads to nothing better. After so many such runs, one after the other, direct solves rest, and
- * all of the budget is for sweeps. Of costly ones the rest doubles each time that the next one is in
- * vain as well. */
+ * all of the budget is for sweeps. Of costly ones the rest doubles each time that the next one is
+ * in vain as well. */
 #define VAIN_COST 4000u /* row updates */
 #define VAIN_RUNS 4u
 #define VAIN_REST 16u
