@@ -371,11 +371,6 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
   return true;
 }
 
-bool hapi_packs_are_high(const hapi_packs *packs)
-{
-  return packs->height > HEIGHT_MOST;
-}
-
 void hapi_packs_store(const hapi_packs *packs, hapi_row *rows)
 {
   for (uint32_t i = 0; i < packs->packable_count; ++i) {

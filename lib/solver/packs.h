@@ -116,7 +116,7 @@ typedef struct hapi_packs {
   uint32_t unit_count;
   uint32_t loose_count;
   uint32_t loose_rows;
-  uint32_t height; /* the highest level */
+  uint32_t height; /* the highest level; 0: not known */
   bool in_use;     /* the impulses of packed rows are here */
   hapi_packed_rows known;
 } hapi_packs;
@@ -128,9 +128,6 @@ extern const hapi_pack_work *const hapi_pack_work_avx2; /* NULL: not built */
  * False: nothing is packed. */
 bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
                       uint32_t body_count);
-/* [haptic] After hapi_packs_begin: whether the contacts are those of a stack too high for packs. */
-bool hapi_packs_are_high(const hapi_packs *packs);
-
 /* The impulses to the rows, and back. */
 void hapi_packs_store(const hapi_packs *packs, hapi_row *rows);
 void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows);
