@@ -210,7 +210,10 @@ static void tail_report(bench *b, FILE *csv, const tail_case *what, tail_tick *t
 static hap_status tail_measure(bench *b, FILE *csv, tail_case *what)
 {
   tail_tick *ticks = calloc(what->ticks, sizeof *ticks);
-  hap_status status = ticks != NULL ? HAP_OK : bench_fail(b, HAP_ERROR_MEMORY, "no memory");
+  hap_status status = HAP_OK;
+  if (ticks == NULL) {
+    return bench_fail(b, HAP_ERROR_MEMORY, "no memory for the ticks of %s", what->scene);
+  }
   int repeats = b->quick ? REPEATS_QUICK : REPEATS;
   for (int i = 0; i < repeats && status >= HAP_OK; ++i) {
     status = tail_run(b, what, i == 0, ticks);
