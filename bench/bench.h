@@ -64,6 +64,7 @@ hap_status bench_scaling(bench *b);
 hap_status bench_spidar(bench *b);
 hap_status bench_stability(bench *b);
 hap_status bench_stopped(bench *b);
+hap_status bench_tail(bench *b);
 hap_status bench_tick(bench *b);
 
 /* ---- tables, checks ---- */

@@ -85,6 +85,7 @@ static const program programs[] = {
      "hapode-run in real time, stopped by signals or beside busy loops, with the virtual device "
      "and "
      "a SPIDAR's emulator: force, steps, and what the guard does"},
+    {"tail", bench_tail, "the slowest ticks of every scene, at rest and pushed; --scene NAME[:N]"},
     {"tick", bench_tick,
      "the haptic loop alone: time of a tick; --scene NAME: of one case with contacts"},
 };
@@ -206,7 +207,7 @@ static bool options_fit(const program *p, const bench *b)
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
       p->run != bench_effects && p->run != bench_faults && p->run != bench_late &&
       p->run != bench_peers && p->run != bench_remote && p->run != bench_hosting &&
-      p->run != bench_influence) {
+      p->run != bench_influence && p->run != bench_tail) {
     wrong = "has no scenes to choose from";
   } else if (b->random_worlds > 0 && (p->run != bench_faults || b->scene != NULL)) {
     wrong = "has no random worlds: --random is for faults, without --scene";

@@ -183,7 +183,7 @@ TEST(a_direct_solve_does_not_lose_what_is_no_number)
   CHECK(isnan(hapi_island_inspect(&is, false)));
   make_broken();
   CHECK(hapi_direct_run(&s.solver, 1000) == 0);
-  CHECK(s.solver.direct_residual == HUGE_VAL);
+  CHECK(s.solver.direct.residual == HUGE_VAL);
 }
 
 /* ---- other islands ---- */

@@ -35,6 +35,7 @@ typedef struct hapi_work {
   uint64_t most; /* of a tick, solves stop there; 0: no bound */
   uint64_t done; /* in this tick */
   uint64_t all;  /* since start */
+  double usual;  /* about the median of a tick, a row counted as ROW_KEPT (contact_step.c) */
 } hapi_work;
 
 typedef struct hapi_rows {

@@ -15,9 +15,10 @@
 #define DEAR_RUNS 32u
 #define CALM_UPDATES 4000u /* row updates of hapi_solver_sweep_on, and two sweeps */
 
-/* A direct solve that costs more than this is in vain when it leads to nothing better. After so
- * many such runs, one after the other, direct solves rest, and all of the budget is for sweeps. The
- * rest doubles each time that the next one is in vain as well. */
+/* A direct solve that costs more than this, or makes a run longer than enough, is in vain when it
+ * leads to nothing better. After so many such runs, one after the other, direct solves rest, and
+ * all of the budget is for sweeps. Of costly ones the rest doubles each time that the next one is
+ * in vain as well. */
 #define VAIN_COST 4000u /* row updates */
 #define VAIN_RUNS 4u
 #define VAIN_REST 16u
@@ -30,6 +31,17 @@
 #define RATE_MOST 0.99    /* of sweeps that lead nowhere */
 #define PAIRS_EACH 4u     /* sweeps, of steps of all pairs */
 #define PAIRS_FALL 0.25   /* of what sweeps correct, from one such step to the next */
+
+/* A run that has taken enough may leave so many times `coarse`, which is four times the drift of
+ * the force. It makes no direct solve where so many times the sweeps that one costs will do: the
+ * next runs make them. */
+#define LEAVE 16.0
+#define LEAVE_SWEEPS 3u
+/* Levels: a higher stack is solved at once. Where what slid comes to stick in one of eight, solves
+ * that went on from tick to tick were 0.2 to 2 % off, by chance. */
+#define SPREAD_HEIGHT 4u
+/* So is what has more rows: a row of 30 light cubes was 0.8 % off, and 0.5 % solved at once. */
+#define SPREAD_ROWS 300u
 
 /* ---- preparation ---- */
 
@@ -617,12 +629,14 @@ static void note_vain(hapi_solver *solver, uint32_t dearest)
   if (dearest == 0) {
     return;
   }
-  if (solver->direct_solves > 0 || dearest <= VAIN_COST) {
+  bool costly = dearest > VAIN_COST;
+  bool over = solver->enough > 0 && solver->updates > solver->enough;
+  if (solver->direct_solves > 0 || (!costly && !over)) {
     solver->rest.vain = 0;
     return;
   }
   if (++solver->rest.vain >= VAIN_RUNS && solver->rest.rows == 0) {
-    uint32_t again = solver->rest.vain - VAIN_RUNS;
+    uint32_t again = costly ? solver->rest.vain - VAIN_RUNS : 0;
     uint32_t rest = again < 8 ? VAIN_REST << again : VAIN_REST_MOST;
     solver->rest.rows = solver->row_count;
     solver->rest.runs = rest < VAIN_REST_MOST ? rest : VAIN_REST_MOST;
@@ -686,11 +700,12 @@ static double sweeps_rate(double before2, double before, double now)
   return rate < RATE_MOST ? rate : RATE_MOST;
 }
 
-/* Whether as many sweeps as a direct solve costs will do, where something may stay undone. */
-static bool sweeps_suffice(const hapi_solver *solver, double rate)
+/* Whether so many times the sweeps that a direct solve costs will do, where something may stay
+ * undone. */
+static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t times)
 {
   double share = 1.0;
-  uint32_t sweeps = DIRECT_SWEEPS * solver->row_count / sweep_cost(solver);
+  uint32_t sweeps = times * DIRECT_SWEEPS * solver->row_count / sweep_cost(solver);
   for (uint32_t i = 0; i < sweeps; ++i) {
     share *= rate;
   }
@@ -705,6 +720,24 @@ static bool pairs_are_due(const hapi_solver *solver, double corrected)
   const hapi_aggregate *all = solver->packs.aggregate;
   return solver->packs.in_use && all != NULL && all->count > 0 && solver->sweeps >= 2 &&
          (solver->sweeps - 2) % PAIRS_EACH == 0 && solver->corrected < PAIRS_FALL * corrected;
+}
+
+/* Whether what is due is little enough for the next run. tried: direct solves lead to nothing
+ * better now. */
+static bool may_leave(const hapi_solver *solver, bool tried)
+{
+  return solver->enough > 0 && solver->coarse > 0.0 && solver->residual < HAPI_COARSE &&
+         (tried || solver->corrected < LEAVE * solver->coarse);
+}
+
+/* Whether one more direct solve is worth its cost. */
+static bool direct_pays(const hapi_solver *solver, double rate, bool first, bool tried)
+{
+  bool fits = solver->updates + solver->direct.cost <= solver->enough;
+  bool cheap = solver->direct.cost <= VAIN_COST;
+  return !sweeps_suffice(solver, rate, 1) &&
+         (fits || !may_leave(solver, tried) ||
+          (first && cheap && !sweeps_suffice(solver, rate, LEAVE_SWEEPS)));
 }
 
 /* It goes by rows. */
@@ -732,6 +765,7 @@ void hapi_solver_run(hapi_solver *solver)
   bool may = solver->direct_rows > 0;
   bool dear = may && stays_dear(solver);
   bool direct = may && !dear;
+  bool tried = dear;
   uint32_t dearest = 0;
   sweep_way way = {0};
   solver->packs.in_use = false;
@@ -743,6 +777,9 @@ void hapi_solver_run(hapi_solver *solver)
     return;
   }
   solver->packs.in_use = hapi_packs_begin(&solver->packs, solver->rows, rows, solver->body_count);
+  if (solver->packs.height > SPREAD_HEIGHT || rows > SPREAD_ROWS) {
+    solver->enough = 0;
+  }
   if (solver->owes) {
     triples_start(solver);
   }
@@ -765,8 +802,9 @@ void hapi_solver_run(hapi_solver *solver)
     double rate = sweeps_rate(before[1], before[0], solver->corrected);
     before[1] = before[0];
     before[0] = solver->corrected;
+    bool enough = solver->updates >= solver->enough && may_leave(solver, tried);
     if (is_settled(solver) ||
-        (solver->sweeps >= 2 && (left < cost || solver->sweeps == solver->max_sweeps))) {
+        (solver->sweeps >= 2 && (enough || left < cost || solver->sweeps == solver->max_sweeps))) {
       break;
     }
     if (pairs_are_due(solver, at_pairs)) {
@@ -780,17 +818,21 @@ void hapi_solver_run(hapi_solver *solver)
      * active rows, sweeps from the second half still come near, and the next tick starts from
      * there. */
     if (direct && solver->sweeps >= direct_from && 2 * left > solver->update_budget &&
-        !sweeps_suffice(solver, rate) && (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
+        direct_pays(solver, rate, dearest == 0, tried) &&
+        (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
+      uint32_t accepted = solver->direct_solves;
       uint32_t spent = direct_run(solver, (uint32_t)left - cost);
       updates_spend(solver, &left, spent);
+      solver->direct.cost = spent;
+      tried = tried || solver->direct_solves == accepted;
       way.begun = false;
       before[0] = before[1] = 0.0;
       bool first = dearest == 0;
       dearest = spent > dearest ? spent : dearest;
-      direct = solver->direct_end != HAPI_DIRECT_DEAR; /* now, and so in the next round */
-      const bool reduced = solver->direct_end == HAPI_DIRECT_REDUCED;
-      if (direct && solver->direct_residual < (reduced ? HAPI_UNSOLVED : solver->tolerance)) {
-        solver->residual = solver->direct_residual;
+      direct = solver->direct.end != HAPI_DIRECT_DEAR; /* now, and so in the next round */
+      const bool reduced = solver->direct.end == HAPI_DIRECT_REDUCED;
+      if (direct && solver->direct.residual < (reduced ? HAPI_UNSOLVED : solver->tolerance)) {
+        solver->residual = solver->direct.residual;
         break;
       }
       if (!direct && first) {

@@ -39,6 +39,13 @@ typedef enum hapi_direct_end {
   HAPI_DIRECT_DEAR     /* an island was too large or too dear for the budget */
 } hapi_direct_end;
 
+/* The last direct run. */
+typedef struct hapi_direct_last {
+  hapi_direct_end end;
+  uint32_t cost;   /* row updates */
+  double residual; /* the largest correction due after it, m/s */
+} hapi_direct_last;
+
 typedef struct hapi_solver {
   hapi_row *rows;
   double (*v)[6];    /* in: free velocities, without any row's impulse; out: with all */
@@ -53,24 +60,25 @@ typedef struct hapi_solver {
                            sum of impulse^2 x response, and none is HAPI_COARSE; 0: never */
   uint32_t update_budget; /* row updates in all sweeps and direct solves, these counted by their
                              cost; two sweeps are made in any case */
-  uint32_t max_sweeps;    /* beyond two; 0: what update_budget allows */
-  uint32_t direct_rows;   /* islands of at most this many free rows are solved directly; 0: none */
-  double *work;           /* for direct solves; an island that does not fit is left to sweeps */
-  size_t work_count;      /* doubles, see HAPI_SOLVER_WORK */
-  hapi_packs packs;       /* its arrays; work NULL: rows are updated one by one */
+  uint32_t enough;      /* row updates, counted likewise: where `coarse` is above 0 and what is due
+                           is little, the rest is for the next run; 0: until it is settled */
+  uint32_t max_sweeps;  /* beyond two; 0: what update_budget allows */
+  uint32_t direct_rows; /* islands of at most this many free rows are solved directly; 0: none */
+  double *work;         /* for direct solves; an island that does not fit is left to sweeps */
+  size_t work_count;    /* doubles, see HAPI_SOLVER_WORK */
+  hapi_packs packs;     /* its arrays; work NULL: rows are updated one by one */
 
   bool ready; /* in: every row is (hapi_row_ready), or the rows are those of the last run, with
                          its impulses in v, but for hapi_row_retarget */
   bool owes;  /* in: impulses of triples are not in v yet */
   bool apart; /* in: all rows are single, and no two have a body in common: one sweep solves them */
-  hapi_direct_rest rest;      /* inner */
-  hapi_direct_end direct_end; /* inner */
-  double direct_residual;     /* inner: the largest correction due after a direct run, m/s */
-  uint32_t sweeps;            /* out */
-  uint64_t updates;           /* out: row updates, direct solves counted by their cost */
-  uint32_t direct_solves;     /* out: that were accepted */
-  double residual;  /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
-  double corrected; /* inner: J, twice the energy of the last sweep's corrections */
+  hapi_direct_rest rest;   /* inner */
+  hapi_direct_last direct; /* inner */
+  uint32_t sweeps;         /* out */
+  uint64_t updates;        /* out: row updates, direct solves counted by their cost */
+  uint32_t direct_solves;  /* out: that were accepted */
+  double residual;         /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
+  double corrected;        /* inner: J, twice the energy of the last sweep's corrections */
 } hapi_solver;
 
 /* m/s: what is left undone and may add energy; below, asking costs too much */
@@ -166,7 +174,7 @@ double hapi_ball_wanted(const hapi_row *first, double radius, const double error
 double hapi_ball_update(hapi_solver *solver, hapi_row *first);
 
 /* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
- * updates. Sets direct_end and direct_residual. Rows are prepared, v has the impulses. */
+ * updates. Sets end and residual of `direct`. Rows are prepared, v has the impulses. */
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
 
 /* Whether a responds: j A j^T is 0 only if it does not. */

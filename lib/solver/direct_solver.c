@@ -334,8 +334,8 @@ static uint32_t mechanism_improve(hapi_island *is, uint32_t step, uint32_t budge
       go_back(is);
     }
   }
-  if (*io_due < HAPI_UNSOLVED && solver->direct_end != HAPI_DIRECT_DEAR) {
-    solver->direct_end = HAPI_DIRECT_REDUCED;
+  if (*io_due < HAPI_UNSOLVED && solver->direct.end != HAPI_DIRECT_DEAR) {
+    solver->direct.end = HAPI_DIRECT_REDUCED;
   }
   return spent;
 }
@@ -353,16 +353,16 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
   double due = hapi_island_inspect(is, sticking);
   uint32_t spent = 0;
   if (due < solver->tolerance) {
-    solver->direct_residual = fmax(solver->direct_residual, due);
+    solver->direct.residual = fmax(solver->direct.residual, due);
     return 0;
   }
   if (!isfinite(due)) { /* nothing can begin from it */
-    solver->direct_residual = HUGE_VAL;
+    solver->direct.residual = HUGE_VAL;
     return 0;
   }
   if (is->free_rows == 0 || is->free_rows > solver->direct_rows || !hapi_island_gather(is)) {
-    solver->direct_end = is->free_rows > 0 ? HAPI_DIRECT_DEAR : solver->direct_end;
-    solver->direct_residual = HUGE_VAL;
+    solver->direct.end = is->free_rows > 0 ? HAPI_DIRECT_DEAR : solver->direct.end;
+    solver->direct.residual = HUGE_VAL;
     return 0;
   }
   uint16_t leaf = all->first_leaf[index];
@@ -371,7 +371,7 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
   hub_state hubs = {.left = budget, .step = step};
   bool has_leaves = leaf != all->last_leaf[index] && solver->hub_count <= HUBS_MAX;
   if (!hapi_island_place(is) || (has_leaves ? step : cost) > budget) {
-    solver->direct_end = HAPI_DIRECT_DEAR;
+    solver->direct.end = HAPI_DIRECT_DEAR;
   } else if (has_leaves) {
     solver->direct_solves += improve_hubs(is, all, leaf, &hubs, &due);
     spent = budget - hubs.left;
@@ -383,7 +383,7 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
       spent += mechanism_improve(is, step, budget - spent, &due);
     }
   }
-  solver->direct_residual = fmax(solver->direct_residual, due);
+  solver->direct.residual = fmax(solver->direct.residual, due);
   return spent;
 }
 
@@ -392,14 +392,14 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   hapi_island is;
   lists all;
   uint32_t spent = 0;
-  solver->direct_end = HAPI_DIRECT_DONE;
-  solver->direct_residual = HUGE_VAL;
+  solver->direct.end = HAPI_DIRECT_DONE;
+  solver->direct.residual = HUGE_VAL;
   if (solver->body_count > HAPI_SOLVER_BODIES ||
       solver->work_count < HAPI_ROW_ARRAYS * (size_t)solver->row_count) {
     return 0;
   }
   islands_split(solver, &all);
-  solver->direct_residual = 0.0;
+  solver->direct.residual = 0.0;
   is.solver = solver;
   is.held = false;
   is.gain = solver->work;

@@ -337,7 +337,7 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
                       uint32_t body_count)
 {
   if (packs->work == NULL || body_count > packs->body_capacity || row_count < 3 * PACKABLE_LEAST) {
-    packs->count = 0;
+    packs->count = packs->height = 0;
     return false;
   }
   if (packs_stand(packs, row_count, body_count)) {
@@ -347,7 +347,7 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
   if (!packs_hold(packs, rows, row_count, body_count)) {
     packs->known.row_count = row_count;
     packs->known.body_count = body_count;
-    packs->count = 0;
+    packs->count = packs->height = 0;
     units_find(packs, rows, row_count);
     if (packs->packable_count < PACKABLE_LEAST) {
       return false;

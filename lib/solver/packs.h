@@ -119,7 +119,7 @@ typedef struct hapi_packs {
   uint32_t unit_count;
   uint32_t loose_count;
   uint32_t loose_rows;
-  uint32_t height; /* the highest level */
+  uint32_t height; /* the highest level; 0: not known */
   bool in_use;     /* the impulses of packed rows are here */
   hapi_packed_rows known;
   hapi_aggregate *aggregate; /* NULL: no steps */

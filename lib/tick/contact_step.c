@@ -38,6 +38,14 @@
 #define COARSE_MOST 1e-10 /* the most, under a hand */
 #define COARSE_FADE 0.98  /* a tick */
 
+/* A tick whose solves have taken half as many row updates again as is usual, or what is done within
+ * 20 us, leaves the rest to the next ticks, where the rest is little. */
+#define ENOUGH_LEAST 1500.0 /* row updates */
+#define ENOUGH_SHARE 1.5
+#define ROW_KEPT 2.0     /* row updates that a row costs besides: most are kept */
+#define USUAL_STEP 0.002 /* a tick: doubles in 350 of them */
+#define USUAL_ROW 4.0    /* row updates, at least for each row: kept, and swept twice */
+
 /* ---- bodies ---- */
 
 static void body_begin(hapi_local_body *body, const hapi_patches *patches)
@@ -449,6 +457,28 @@ static void rows_set_coarse(hapi_rows *rows, bool reaches)
   rows->solver.coarse = rows->touched ? hapi_min(before, most) : most;
 }
 
+/* Row updates of this tick, without the making of rows. */
+static double work_counted(const hapi_rows *rows)
+{
+  return (double)rows->work.done -
+         ((double)HAPI_ROW_MAKING - ROW_KEPT) * (double)rows->solver.row_count;
+}
+
+/* Row updates, of the next solve. */
+static uint32_t rows_enough(const hapi_rows *rows)
+{
+  double most = hapi_max(ENOUGH_SHARE * rows->work.usual, ENOUGH_LEAST);
+  return (uint32_t)hapi_max(most - work_counted(rows), 1.0);
+}
+
+/* It follows the median, whatever single ticks take. */
+static void rows_note_usual(hapi_rows *rows)
+{
+  double usual = rows->work.usual;
+  usual *= work_counted(rows) > usual ? 1.0 + USUAL_STEP : 1.0 - USUAL_STEP;
+  rows->work.usual = hapi_max(usual, USUAL_ROW * (double)rows->solver.row_count);
+}
+
 static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
 {
   hapi_solver *solver = &rows->solver;
@@ -457,6 +487,7 @@ static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
   uint32_t most = solver->update_budget;
   uint64_t left = work->most > work->done ? work->most - work->done : 0;
   solver->update_budget = work->most > 0 && left < most ? (uint32_t)left : most;
+  solver->enough = solver->coarse > 0.0 ? rows_enough(rows) : 0;
   hapi_solver_run(solver);
   hapi_solver_calm(solver);
   solver->update_budget = most;
@@ -610,6 +641,7 @@ void hapi_contact_step(hapi_tick *tick)
     bodies_take_velocities(&tick->bodies, &tick->rows, tick->facts.wishes);
   }
   rows_note_unsolved(&tick->rows);
+  rows_note_usual(&tick->rows);
   tick->rows.work.all += tick->rows.work.done;
   hapi_pointer_forces(&tick->facts, &tick->pointers, &tick->bodies, &tick->touches, &tick->rows,
                       &tick->sample);

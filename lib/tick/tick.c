@@ -119,6 +119,7 @@ void hapi_tick_reset(hapi_tick *tick)
   solver->row_count = solver->body_count = 0;
   hapi_packs_forget(&solver->packs);
   solver->rest = (hapi_direct_rest){0};
+  solver->direct = (hapi_direct_last){.cost = 0};
   solver->ready = true; /* as the rows are made */
   tick->guard = (hapi_guard){.mode = tick->guard.mode};
   memset(&tick->sample, 0, sizeof tick->sample);
