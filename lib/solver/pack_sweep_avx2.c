@@ -16,7 +16,7 @@
 #endif
 #include "solver/pack_sweep.h"
 
-static const hapi_pack_work wide = {packs_push, packs_sweep, way_energy, way_go_on};
+static const hapi_pack_work wide = {packs_couple, packs_push, packs_sweep, way_go_on};
 #ifdef __clang__
 #pragma clang attribute pop
 #else
