@@ -74,8 +74,10 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
     hapi_stay_follow(bodies, body);
     hapi_body_free_velocity(body, facts->period, solver->v[body->row]);
     memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
-    memcpy(solver->packs.inverse_inertia[body->row], body->inverse_inertia,
-           sizeof body->inverse_inertia);
+    if (solver->packs.work != NULL) {
+      memcpy(solver->packs.inverse_inertia[body->row], body->inverse_inertia,
+             sizeof body->inverse_inertia);
+    }
     bodies->resting += (body->flags & HAPI_BODY_RESTING) != 0;
   }
 }
