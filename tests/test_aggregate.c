@@ -12,6 +12,7 @@
 #include "solver/pack_choice.h"
 
 #define BODIES 48u
+#define CUBE 0.05 /* kg */
 #define PAIRS (2 * BODIES)
 #define PAIR_CONTACTS 4u
 #define ROWS (3 * PAIRS * PAIR_CONTACTS)
@@ -29,7 +30,8 @@ typedef struct problem {
   hapi_pack packs[PACKS];
   hapi_pack_contact contacts[PACKS];
   double impulse[PACKS][3][HAPI_LANES];
-  double response[PACKS][3][HAPI_LANES];
+  hapi_pack_block blocks[HAPI_PACK_BLOCKS(PACKS)];
+  double inverse_inertia[BODIES][9];
   hapi_packable packables[HAPI_LANES * PACKS];
   hapi_pack_unit units[HAPI_LANES * PACKS];
   uint32_t order[HAPI_LANES * PACKS];
@@ -72,21 +74,27 @@ static void problem_begin(problem *p, const hapi_pack_work *work, bool pairs)
   p->solver.packs.of = p->packs;
   p->solver.packs.contacts = p->contacts;
   p->solver.packs.impulse = p->impulse;
-  p->solver.packs.response = p->response;
+  p->solver.packs.blocks = p->blocks;
+  p->solver.packs.inverse_inertia = p->inverse_inertia;
+  for (uint32_t i = 1; i < BODIES; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      p->inverse_inertia[i][4 * k] = 1.0 / (CUBE * 4e-4);
+    }
+  }
   p->solver.packs.packables = p->packables;
   p->solver.packs.units = p->units;
-  p->solver.packs.order = p->order;
-  p->solver.packs.sorted = p->sorted;
+  p->solver.packs.plan.order = p->order;
+  p->solver.packs.plan.sorted = p->sorted;
   p->solver.packs.loose = p->loose;
-  p->solver.packs.levels = p->levels;
-  p->solver.packs.colors = p->colors;
+  p->solver.packs.plan.levels = p->levels;
+  p->solver.packs.plan.colors = p->colors;
   p->solver.packs.contact_capacity = PACKS;
   p->solver.packs.body_capacity = BODIES;
   p->solver.packs.aggregate = pairs ? &p->aggregate : NULL;
 }
 
 /* Contacts of two bodies across x at points of a square, 3 rows each. b 0: the static world. */
-static void pair_add(problem *p, uint32_t a, uint32_t b, uint32_t contacts, double mass, double mu)
+static void pair_add(problem *p, uint32_t a, uint32_t b, uint32_t contacts, double mu)
 {
   for (uint32_t c = 0; c < contacts; ++c) {
     uint32_t first = p->solver.row_count;
@@ -105,12 +113,12 @@ static void pair_add(problem *p, uint32_t a, uint32_t b, uint32_t contacts, doub
       for (int k = 0; k < 3; ++k) {
         row->ja[k] = d[k];
         row->ja[3 + k] = turn[0][k];
-        row->ba[k] = d[k] / mass;
-        row->ba[3 + k] = turn[0][k] / (mass * 4e-4);
+        row->ba[k] = d[k] / CUBE;
+        row->ba[3 + k] = turn[0][k] / (CUBE * 4e-4);
         row->jb[k] = b == 0 ? 0.0 : -d[k];
         row->jb[3 + k] = b == 0 ? 0.0 : -turn[1][k];
-        row->bb[k] = row->jb[k] / mass;
-        row->bb[3 + k] = row->jb[3 + k] / (mass * 4e-4);
+        row->bb[k] = row->jb[k] / CUBE;
+        row->bb[3 + k] = row->jb[3 + k] / (CUBE * 4e-4);
       }
       row->hi = i == 0 ? HUGE_VAL : 0.0;
       row->mu = i == 0 ? 0.0 : mu;
@@ -124,7 +132,6 @@ static void pair_add(problem *p, uint32_t a, uint32_t b, uint32_t contacts, doub
 
 /* ---- a row of cubes ---- */
 
-#define CUBE 0.05 /* kg */
 #define SPEED 1.0 /* m/s of the last one, towards the others */
 
 static void row_make(problem *p, const hapi_pack_work *work, bool pairs)
@@ -134,7 +141,7 @@ static void row_make(problem *p, const hapi_pack_work *work, bool pairs)
   state = 7;
   p->v[BODIES - 1][0] = p->free_v[BODIES - 1][0] = -SPEED;
   for (uint32_t i = 1; i + 1 < BODIES; ++i) {
-    pair_add(p, i + 1, i, PAIR_CONTACTS, CUBE, 0.0);
+    pair_add(p, i + 1, i, PAIR_CONTACTS, 0.0);
   }
   p->solver.tolerance = 1e-9;
 }
@@ -195,9 +202,9 @@ static void tree_make(problem *p, const hapi_pack_work *work, uint64_t seed)
   for (uint32_t i = 1; i < BODIES; ++i) {
     uint32_t before = i > 3 ? i - 1 - (uint32_t)(1.0 + random_next()) : i - 1;
     uint32_t contacts = 1 + (uint32_t)(2.0 * (1.0 + random_next()));
-    pair_add(p, i, before, contacts < 4 ? contacts : 4, CUBE, 0.4);
+    pair_add(p, i, before, contacts < 4 ? contacts : 4, 0.4);
     if (random_next() > 0.0 && before != 0) {
-      pair_add(p, i, 0, 2, CUBE, 0.4);
+      pair_add(p, i, 0, 2, 0.4);
     }
   }
 }

@@ -77,6 +77,32 @@ void *hapi_alloc_array(size_t count, size_t size)
   return hapi_alloc(count * size);
 }
 
+/* The heap's own pointer stands before the line. */
+void *hapi_alloc_lines(size_t count, size_t size)
+{
+  const size_t room = HAPI_CACHE_LINE + sizeof(void *);
+  if (size != 0 && count > (SIZE_MAX - room) / size) {
+    return NULL;
+  }
+  unsigned char *memory = hapi_alloc(count * size + room);
+  if (memory == NULL) {
+    return NULL;
+  }
+  unsigned char *line = memory + sizeof memory;
+  line += (HAPI_CACHE_LINE - (uintptr_t)line % HAPI_CACHE_LINE) % HAPI_CACHE_LINE;
+  memcpy(line - sizeof memory, &memory, sizeof memory);
+  return line;
+}
+
+void hapi_free_lines(void *memory)
+{
+  void *of_heap;
+  if (memory != NULL) {
+    memcpy(&of_heap, (unsigned char *)memory - sizeof of_heap, sizeof of_heap);
+    hapi_free(of_heap);
+  }
+}
+
 void hapi_free(void *memory)
 {
   if (memory != NULL) {

@@ -13,8 +13,12 @@
 
 void *hapi_alloc(size_t size);                     /* zeroed; NULL when there is none */
 void *hapi_alloc_array(size_t count, size_t size); /* zeroed; NULL on overflow as well */
-/* Likewise, and the heap may bring pages in when they are used first: for much that is seldom used,
- * and never by the haptic thread. */
+/* The same at the begin of a cache line; goes back by hapi_free_lines. */
+#define HAPI_CACHE_LINE 64u
+void *hapi_alloc_lines(size_t count, size_t size);
+void hapi_free_lines(void *memory); /* NULL allowed */
+/* As hapi_alloc_array, and the heap may bring pages in when they are used first: for much that is
+ * seldom used, and never by the haptic thread. */
 void *hapi_alloc_late(size_t count, size_t size);
 void hapi_free(void *memory); /* NULL allowed */
 /* Grows an array of elements of one size to hold count more than those in use; false: no memory. */

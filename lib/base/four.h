@@ -9,6 +9,13 @@
 
 #include "base/lanes.h"
 
+/* For work on fours whose flags have to be known when it is compiled. */
+#if defined(__GNUC__)
+#define HAPI_FOUR_INLINE inline __attribute__((always_inline))
+#else
+#define HAPI_FOUR_INLINE inline
+#endif
+
 #ifdef HAPI_FOUR_AVX2
 #include <immintrin.h>
 

@@ -38,7 +38,7 @@ bool hapi_tick_memory_create(hapi_tick *tick, const hapi_capacity *c)
   HAPI_ASSERT(rows->capacity > 0 && rows->solver.work_count > 0);
   hapi_tick_arrays(tick, arrays);
   for (int i = 0; i < HAPI_TICK_ARRAYS; ++i) {
-    void *memory = hapi_alloc_array(arrays[i].count, arrays[i].size);
+    void *memory = hapi_alloc_lines(arrays[i].count, arrays[i].size);
     memcpy(arrays[i].at, &memory, sizeof memory);
     good = good && memory != NULL;
   }
@@ -52,6 +52,6 @@ void hapi_tick_memory_destroy(hapi_tick *tick)
   for (int i = 0; i < HAPI_TICK_ARRAYS; ++i) {
     void *memory;
     memcpy(&memory, arrays[i].at, sizeof memory);
-    hapi_free(memory);
+    hapi_free_lines(memory);
   }
 }

@@ -307,7 +307,7 @@ static double step_length(const hapi_aggregate *w)
   return length;
 }
 
-static void body_push(double v[6], double impulse, const hapi_aggregate_row *row, int side)
+static void body_push(double *v, double impulse, const hapi_aggregate_row *row, int side)
 {
   double linear = (side == 0 ? impulse : -impulse) * row->mass[side];
   hapi_v3_madd(v, linear, row->linear, v);
@@ -345,9 +345,9 @@ double hapi_aggregate_step(hapi_packs *packs, double (*v)[6])
       continue;
     }
     w->growth[w->slot[i]] = change / row->sum;
-    body_push(v[pack->a[lane]], change, row, 0);
+    body_push(v[0] + pack->a[lane], change, row, 0);
     if (pack->paired) {
-      body_push(v[pack->b[lane]], change, row, 1);
+      body_push(v[0] + pack->b[lane], change, row, 1);
     }
   }
   for (uint32_t p = 0; p < packs->count; ++p) {

@@ -538,27 +538,6 @@ static void way_begin(const hapi_solver *solver, sweep_way *way)
   way->begun = true;
 }
 
-/* J, of the change since the sweep's begin. */
-static double way_energy(const hapi_solver *solver, const sweep_way *way)
-{
-  size_t at = way->packed;
-  double size2 = 0.0;
-  if (at > 0) {
-    size2 = way->work->way_energy(&solver->packs.impulse[0][0][0], way->x,
-                                  &solver->packs.response[0][0][0], at);
-  }
-  for (uint32_t i = 0; i < loose_count(solver); ++i) {
-    hapi_loose_rows run = loose_at(solver, i);
-    for (uint32_t k = run.first; k < run.end; ++k) {
-      const hapi_row *row = &solver->rows[k];
-      double d = row->inverse != 0.0 ? row->impulse - way->x[at] : 0.0;
-      size2 += d * d * row->response;
-      ++at;
-    }
-  }
-  return size2;
-}
-
 /* As hapi_pack_work.way_go_on, of one number. */
 static void number_go_on(double *now, double *x, double *p, double share)
 {
@@ -571,7 +550,7 @@ static void number_go_on(double *now, double *x, double *p, double share)
 /* From the end of one sweep to the begin of the next one. */
 static void way_go_on(hapi_solver *solver, sweep_way *way)
 {
-  double size2 = way_energy(solver, way);
+  double size2 = solver->corrected; /* of each row's change since the begin */
   bool ahead = size2 <= way->size2 && way->size2 > 0.0 && way->size2 < HUGE_VAL;
   double share = ahead ? size2 / way->size2 : 0.0;
   size_t at = way->packed;

@@ -121,8 +121,9 @@ void hapi_row_ready(hapi_solver *solver, uint32_t index);
 void hapi_single_ready(hapi_solver *solver, uint32_t index, double response);
 
 /* The same of the 1 to 3 rows of a contact, of the same two bodies: its normal, then its
- * frictions. by_mass: linear parts are those of one direction a row, b's opposite to a's, and what
- * responds does so by its mass and inertia. */
+ * frictions. by_mass: linear parts are those of one direction a row, of length 1 and at right
+ * angles, b's opposite to a's; moments are those of one point; and what responds does so by its
+ * mass and packs.inverse_inertia. */
 void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, bool by_mass);
 
 /* The same of rows that were ready in the last run, all of use, with the impulses of that run and

@@ -16,7 +16,8 @@
 #endif
 #include "solver/pack_sweep.h"
 
-static const hapi_pack_work wide = {packs_push, packs_sweep, way_energy, way_go_on, packs_aggregate};
+static const hapi_pack_work wide = {packs_couple, packs_push, packs_sweep, way_go_on,
+                                    packs_aggregate};
 #ifdef __clang__
 #pragma clang attribute pop
 #else

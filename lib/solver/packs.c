@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "base/vec.h"
 
 #define PACKABLE_LEAST 8u /* contacts: fewer are swept as quickly one by one */
 #define FULL_LEAST 2u     /* lanes a pack, in the mean: likewise */
@@ -42,37 +43,85 @@ static double inverse_mass(const double j[6], const double b[6])
   return b[k] / j[k];
 }
 
-static void lane_fill(const hapi_packs *packs, const hapi_pack *pack, uint32_t place,
-                      const hapi_row *row)
+/* The arm along the directions d of three rows, from their moments arm x d. Of left-handed
+ * directions it is the opposite, and so are cross products with it. */
+static void arm_find(const hapi_row *row, bool of_b, double out[3])
+{
+  for (int k = 0; k < 3; ++k) {
+    const hapi_row *turns = &row[(k + 1) % 3];
+    const double *along = row[(k + 2) % 3].ja;
+    out[k] = of_b ? -hapi_v3_dot(turns->jb + 3, along) : hapi_v3_dot(turns->ja + 3, along);
+  }
+}
+
+static void contact_fill(const hapi_packs *packs, uint32_t place, const hapi_row *row)
 {
   uint32_t at = place / HAPI_LANES;
   uint32_t lane = place % HAPI_LANES;
   hapi_pack_contact *c = &packs->contacts[at];
+  double arm[3];
+  arm_find(row, false, arm);
   for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      c->direction[i][k][lane] = row[i].ja[k];
-      c->turn_a[i][k][lane] = row[i].ja[3 + k];
-      c->spin_a[i][k][lane] = row[i].ba[3 + k];
-    }
+    c->arm[i][lane] = arm[i];
     c->softness[i][lane] = row[i].softness;
     c->inverse[i][lane] = row[i].inverse;
-    packs->response[at][i][lane] = row[i].response;
+    c->response[i][lane] = row[i].response;
   }
   c->mu[0][lane] = row[1].mu;
   c->mu[1][lane] = row[2].mu;
   c->coupling[0][lane] = row[1].coupling[0];
   c->coupling[1][lane] = row[2].coupling[0];
   c->coupling[2][lane] = row[2].coupling[1];
-  for (int i = 0; pack->paired && i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      c->turn_b[i][k][lane] = row[i].jb[3 + k];
-      c->spin_b[i][k][lane] = row[i].bb[3 + k];
-    }
-  }
   lane_set_impulses(packs, place, row);
 }
 
+static void turn_fill(const double inverse_inertia[9], double (*out)[HAPI_LANES], uint32_t lane)
+{
+  static const int at[6] = {0, 1, 2, 4, 5, 8};
+  for (int i = 0; i < 6; ++i) {
+    out[i][lane] = inverse_inertia[at[i]];
+  }
+}
+
+/* What the contacts of a lane have in common, from the rows of the first one. */
+static void bodies_fill(const hapi_packs *packs, hapi_pack *pack, uint32_t lane,
+                        const hapi_row *row)
+{
+  double apart[3] = {0.0};
+  double arm[3];
+  double right[3];
+  hapi_v3_cross(row[1].ja, row[2].ja, right);
+  double sign = hapi_v3_dot(row[0].ja, right) < 0.0 ? -1.0 : 1.0;
+  pack->mass_a[lane] = inverse_mass(row->ja, row->ba);
+  turn_fill(packs->inverse_inertia[row->a], pack->turn_a, lane);
+  if (pack->paired) {
+    pack->mass_b[lane] = inverse_mass(row->jb, row->bb);
+    turn_fill(packs->inverse_inertia[row->b], pack->turn_b, lane);
+    arm_find(row, false, arm);
+    arm_find(row, true, apart);
+    hapi_v3_sub(apart, arm, apart);
+  }
+  for (int k = 0; k < 3; ++k) {
+    pack->arms_apart[k][lane] = apart[k];
+    pack->across[k][lane] = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      pack->direction[i][k][lane] = row[i].ja[k];
+      pack->across[k][lane] += sign * apart[i] * row[i].ja[k];
+    }
+  }
+}
+
 /* ---- units, colors and their order ---- */
+
+/* To the last bit: of a patch they are, and of what was made at the same time. */
+static bool same_directions(const hapi_row *row, const hapi_row *other)
+{
+  bool same = true;
+  for (int i = 0; i < 3; ++i) {
+    same = same && memcmp(row[i].ja, other[i].ja, 3 * sizeof row->ja[0]) == 0;
+  }
+  return same;
+}
 
 static void units_find(hapi_packs *packs, const hapi_row *rows, uint32_t row_count)
 {
@@ -86,7 +135,8 @@ static void units_find(hapi_packs *packs, const hapi_row *rows, uint32_t row_cou
     }
     const hapi_row *last =
         packs->packable_count > 0 ? &rows[packs->packables[packs->packable_count - 1].row] : NULL;
-    if (last == NULL || last + 3 != row || last->a != row->a || last->b != row->b) {
+    if (last == NULL || last + 3 != row || last->a != row->a || last->b != row->b ||
+        packs->units[units - 1].count == HAPI_PACK_CONTACTS || !same_directions(last, row)) {
       packs->units[units++] =
           (hapi_pack_unit){.first = packs->packable_count, .paired = row->paired};
     }
@@ -109,10 +159,10 @@ static bool level_lower(uint32_t *level, uint32_t below)
 static void levels_find(hapi_packs *packs, uint32_t body_count)
 {
   bool again = true;
-  memset(packs->levels, 0, body_count * sizeof *packs->levels);
+  memset(packs->plan.levels, 0, body_count * sizeof *packs->plan.levels);
   for (uint32_t i = 0; i < packs->unit_count; ++i) {
     if (!packs->units[i].paired) {
-      packs->levels[packs->packables[packs->units[i].first].a] = 1;
+      packs->plan.levels[packs->packables[packs->units[i].first].a] = 1;
     }
   }
   while (again) {
@@ -120,33 +170,33 @@ static void levels_find(hapi_packs *packs, uint32_t body_count)
     for (uint32_t i = 0; i < packs->unit_count; ++i) {
       const hapi_packable *at = &packs->packables[packs->units[i].first];
       if (packs->units[i].paired) {
-        again = level_lower(&packs->levels[at->a], packs->levels[at->b]) || again;
-        again = level_lower(&packs->levels[at->b], packs->levels[at->a]) || again;
+        again = level_lower(&packs->plan.levels[at->a], packs->plan.levels[at->b]) || again;
+        again = level_lower(&packs->plan.levels[at->b], packs->plan.levels[at->a]) || again;
       }
     }
   }
   packs->height = 1;
   for (uint32_t i = 0; i < body_count; ++i) {
-    packs->height = packs->levels[i] > packs->height ? packs->levels[i] : packs->height;
+    packs->height = packs->plan.levels[i] > packs->height ? packs->plan.levels[i] : packs->height;
   }
 }
 
 /* The first color that neither body has. */
 static void units_color(hapi_packs *packs, uint32_t body_count)
 {
-  memset(packs->colors, 0, body_count * sizeof *packs->colors);
+  memset(packs->plan.colors, 0, body_count * sizeof *packs->plan.colors);
   for (uint32_t i = 0; i < packs->unit_count; ++i) {
     hapi_pack_unit *unit = &packs->units[i];
     const hapi_packable *at = &packs->packables[unit->first];
-    uint64_t used = packs->colors[at->a] | (unit->paired ? packs->colors[at->b] : 0);
+    uint64_t used = packs->plan.colors[at->a] | (unit->paired ? packs->plan.colors[at->b] : 0);
     uint32_t color = 0;
     while (color < COLORS && (used >> color & 1) != 0) {
       ++color;
     }
     unit->color = (uint8_t)color;
     if (color < COLORS) {
-      packs->colors[at->a] |= (uint64_t)1 << color;
-      packs->colors[at->b] |= unit->paired ? (uint64_t)1 << color : 0;
+      packs->plan.colors[at->a] |= (uint64_t)1 << color;
+      packs->plan.colors[at->b] |= unit->paired ? (uint64_t)1 << color : 0;
     }
   }
 }
@@ -181,10 +231,10 @@ static void units_sort(const hapi_packs *packs, uint32_t (*key)(const hapi_pack_
 static void units_order(hapi_packs *packs)
 {
   for (uint32_t i = 0; i < packs->unit_count; ++i) {
-    packs->order[i] = i;
+    packs->plan.order[i] = i;
   }
-  units_sort(packs, key_of_count, packs->order, packs->sorted);
-  units_sort(packs, key_of_color, packs->sorted, packs->order);
+  units_sort(packs, key_of_count, packs->plan.order, packs->plan.sorted);
+  units_sort(packs, key_of_color, packs->plan.sorted, packs->plan.order);
 }
 
 /* ---- packs ---- */
@@ -195,6 +245,7 @@ static bool pack_add(hapi_packs *packs, const hapi_row *rows, const uint32_t *un
   hapi_pack *pack = &packs->of[packs->count];
   memset(pack, 0, sizeof *pack);
   pack->first = packs->contact_count;
+  pack->block = packs->block_count;
   pack->paired = packs->units[units[0]].paired;
   for (uint32_t lane = 0; lane < lanes; ++lane) {
     uint32_t count = packs->units[units[lane]].count;
@@ -205,12 +256,11 @@ static bool pack_add(hapi_packs *packs, const hapi_row *rows, const uint32_t *un
   }
   memset(&packs->contacts[pack->first], 0, pack->count * sizeof *packs->contacts);
   memset(packs->impulse[pack->first], 0, pack->count * sizeof *packs->impulse);
-  memset(packs->response[pack->first], 0, pack->count * sizeof *packs->response);
   for (uint32_t lane = 0; lane < lanes; ++lane) {
     const hapi_pack_unit *unit = &packs->units[units[lane]];
     const hapi_row *row = &rows[packs->packables[unit->first].row];
-    pack->a[lane] = row->a;
-    pack->b[lane] = row->b;
+    pack->a[lane] = 6 * row->a;
+    pack->b[lane] = 6 * row->b;
     for (uint32_t i = 0; i < unit->count; ++i) {
       hapi_packable *packable = &packs->packables[unit->first + i];
       packable->place = (pack->first + i) * HAPI_LANES + lane;
@@ -218,16 +268,27 @@ static bool pack_add(hapi_packs *packs, const hapi_row *rows, const uint32_t *un
     }
   }
   packs->contact_count += pack->count;
+  packs->block_count += pack->count * (pack->count - 1) / 2;
   ++packs->count;
   return true;
 }
 
+/* The last one with the one before, where that is still alone. */
+static void pack_pair(const hapi_packs *packs, bool alike)
+{
+  hapi_pack *pack = &packs->of[packs->count - 1];
+  if (alike && !pack[-1].beside && pack[-1].count == pack->count) {
+    pack[-1].beside = pack->beside = true;
+  }
+}
+
 static void packs_add(hapi_packs *packs, const hapi_row *rows)
 {
-  packs->count = packs->contact_count = 0;
+  packs->count = packs->contact_count = packs->block_count = 0;
   uint32_t lanes = 0;
+  uint32_t last = UINT32_MAX;
   for (uint32_t i = 0; i < packs->unit_count; i += lanes) {
-    const uint32_t *units = &packs->order[i];
+    const uint32_t *units = &packs->plan.order[i];
     uint32_t key = key_of_color(&packs->units[units[0]]);
     lanes = 1;
     while (lanes < HAPI_LANES && i + lanes < packs->unit_count &&
@@ -237,6 +298,8 @@ static void packs_add(hapi_packs *packs, const hapi_row *rows)
     if (packs->units[units[0]].color == LOOSE_COLOR || !pack_add(packs, rows, units, lanes)) {
       return; /* the rest is loose */
     }
+    pack_pair(packs, key == last);
+    last = key;
   }
 }
 
@@ -262,25 +325,37 @@ static void loose_find(hapi_packs *packs, uint32_t row_count)
   loose_add(packs, begin, row_count);
 }
 
-static void packs_fill(const hapi_packs *packs, const hapi_row *rows)
+/* What was made anew. */
+static void unit_fill(const hapi_packs *packs, const hapi_row *rows, const hapi_pack_unit *unit)
 {
-  for (uint32_t i = 0; i < packs->packable_count; ++i) {
-    hapi_packable *packable = &packs->packables[i];
-    if (packable->place == HAPI_NO_PLACE) {
-      continue;
+  hapi_packable *first = &packs->packables[unit->first];
+  hapi_pack *pack = &packs->of[first->pack];
+  bool made = false;
+  for (uint32_t i = 0; i < unit->count; ++i) {
+    const hapi_row *row = &rows[first[i].row];
+    if (first[i].made == row->made) {
+      lane_set_impulses(packs, first[i].place, row);
+    } else {
+      first[i].made = row->made;
+      contact_fill(packs, first[i].place, row);
+      made = true;
     }
-    hapi_pack *pack = &packs->of[packable->pack];
-    const hapi_row *row = &rows[packable->row];
-    uint32_t lane = packable->place % HAPI_LANES;
-    if (packable->made == row->made) {
-      lane_set_impulses(packs, packable->place, row);
-      continue;
-    }
-    packable->made = row->made;
-    pack->mass_a[lane] = inverse_mass(row->ja, row->ba);
-    pack->mass_b[lane] = pack->paired ? inverse_mass(row->jb, row->bb) : 0.0;
-    lane_fill(packs, pack, packable->place, row);
   }
+  if (made) {
+    bodies_fill(packs, pack, first->place % HAPI_LANES, &rows[first->row]);
+    pack->stale = true;
+  }
+}
+
+static void packs_fill(hapi_packs *packs, const hapi_row *rows)
+{
+  for (uint32_t i = 0; i < packs->unit_count; ++i) {
+    const hapi_pack_unit *unit = &packs->units[i];
+    if (packs->packables[unit->first].place != HAPI_NO_PLACE) {
+      unit_fill(packs, rows, unit);
+    }
+  }
+  packs->work->couple(packs);
 }
 
 static void packs_set_impulses(const hapi_packs *packs, const hapi_row *rows)
@@ -300,6 +375,24 @@ static bool packs_stand(const hapi_packs *packs, uint32_t row_count, uint32_t bo
          packs->known.body_count == body_count;
 }
 
+static bool unit_holds(const hapi_packs *packs, const hapi_row *rows, const hapi_pack_unit *unit)
+{
+  const hapi_packable *first = &packs->packables[unit->first];
+  for (uint32_t i = 0; i < unit->count; ++i) {
+    const hapi_packable *packable = &first[i];
+    const hapi_row *row = &rows[packable->row];
+    if (packable->place == HAPI_NO_PLACE || !is_packable(row) || row->a != packable->a ||
+        row->b != packable->b || row->paired != unit->paired) {
+      return false;
+    }
+    bool made = row->made != packable->made || rows[first->row].made != first->made;
+    if (made && !same_directions(&rows[first->row], row)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /* Whether what may be packed is what it was, in the same places. */
 static bool packs_hold(const hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
                        uint32_t body_count)
@@ -308,11 +401,8 @@ static bool packs_hold(const hapi_packs *packs, const hapi_row *rows, uint32_t r
       packs->known.body_count != body_count) {
     return false;
   }
-  for (uint32_t i = 0; i < packs->packable_count; ++i) {
-    const hapi_packable *packable = &packs->packables[i];
-    const hapi_row *row = &rows[packable->row];
-    if (packable->place == HAPI_NO_PLACE || !is_packable(row) || row->a != packable->a ||
-        row->b != packable->b || row->paired != packs->of[packable->pack].paired) {
+  for (uint32_t i = 0; i < packs->unit_count; ++i) {
+    if (!unit_holds(packs, rows, &packs->units[i])) {
       return false;
     }
   }

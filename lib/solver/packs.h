@@ -18,29 +18,47 @@
 #define HAPI_LANES 4u
 #define HAPI_NO_PLACE UINT32_MAX
 
-/* Three rows a lane: normal, then two frictions. Their linear Jacobians are `direction` for a and
- * the opposite for b. An empty lane has zeros. */
+/* Contacts of a pack, at most: one below the other, of the same two bodies and directions. */
+#define HAPI_PACK_CONTACTS 4u
+
+/* Three rows a lane: normal, then two frictions. An empty lane has zeros. */
 typedef struct hapi_pack_contact {
-  double direction[3][3][HAPI_LANES];
-  double turn_a[3][3][HAPI_LANES]; /* ja, its angular part */
-  double spin_a[3][3][HAPI_LANES]; /* ba, likewise */
-  double drive[3][HAPI_LANES];     /* this and the next: see hapi_row */
+  double arm[3][HAPI_LANES];   /* m, from a's centre, along the directions; of left-handed ones the
+                                opposite, as of all that follows from it */
+  double drive[3][HAPI_LANES]; /* this and the next: see hapi_row */
   double softness[3][HAPI_LANES];
   double inverse[3][HAPI_LANES];
+  double response[3][HAPI_LANES];
   double mu[2][HAPI_LANES];
-  double coupling[3][HAPI_LANES];  /* of rows 0 and 1, 0 and 2, 1 and 2 */
-  double turn_b[3][3][HAPI_LANES]; /* this and the next: not used where b does not respond */
-  double spin_b[3][3][HAPI_LANES];
+  double coupling[3][HAPI_LANES]; /* of rows 0 and 1, 0 and 2, 1 and 2 */
 } hapi_pack_contact;
 
+/* Of two contacts of a pack: what an impulse of the earlier one's row (second index) changes at the
+ * later one's (first index), (m/s)/(N s). The way back is the transpose. */
+typedef struct hapi_pack_block {
+  double of[3][3][HAPI_LANES];
+} hapi_pack_block;
+
+/* The directions of the rows are those of all contacts of a lane, at right angles and of length 1.
+ * So a contact is three numbers, its arm, and what it does to the others follows from the motion of
+ * the bodies against each other at a's centre. */
 typedef struct hapi_pack {
+  double direction[3][3][HAPI_LANES]; /* of a's rows; b's are opposite */
+  double mass_a[HAPI_LANES];          /* inverse, 1/kg */
+  double turn_a[6][HAPI_LANES];       /* inverse inertia, world, 1/(kg m^2): xx xy xz yy yz zz */
+  double mass_b[HAPI_LANES];          /* this and what else is of b: where it responds only */
+  double turn_b[6][HAPI_LANES];
+  double across[3][HAPI_LANES];     /* m, from b's centre to a's: world, */
+  double arms_apart[3][HAPI_LANES]; /* and as the arms, which are longer by it from b's centre */
+  uint32_t a[HAPI_LANES];           /* six times the bodies; empty lanes: 0 */
+  uint32_t b[HAPI_LANES];
   uint32_t first; /* contact, and how many one below the other */
   uint32_t count;
-  bool paired;            /* b responds */
-  uint32_t a[HAPI_LANES]; /* bodies; empty lanes: 0 */
-  uint32_t b[HAPI_LANES];
-  double mass_a[HAPI_LANES]; /* inverse, 1/kg */
-  double mass_b[HAPI_LANES];
+  uint32_t block;   /* its first; that of contacts i < j is j (j - 1) / 2 + i on */
+  bool paired;      /* b responds */
+  bool beside;      /* it and another one next to it have one color and count */
+  bool stale;       /* blocks are still those of other arms */
+  uint32_t fill[4]; /* not used: all is a multiple of a register, so that none is in two lines */
 } hapi_pack;
 
 /* A contact that may be packed: where its rows are, and where it is now. */
@@ -53,7 +71,7 @@ typedef struct hapi_packable {
   uint64_t made; /* see hapi_row, of what was packed */
 } hapi_packable;
 
-/* Successive packable contacts of the same bodies. */
+/* Successive packable contacts of the same bodies and directions, HAPI_PACK_CONTACTS at most. */
 typedef struct hapi_pack_unit {
   uint32_t first; /* packable, and how many */
   uint32_t count;
@@ -73,16 +91,19 @@ typedef struct hapi_corrections {
   double energy2; /* J, sum of impulse^2 x response */
 } hapi_corrections;
 
+/* Blocks of so many contacts, at most. */
+#define HAPI_PACK_BLOCKS(contacts) ((size_t)(contacts) * (HAPI_PACK_CONTACTS - 1) / 2 + 1)
+
 struct hapi_packs;
 
 /* How the packs are worked on; by what the processor can, with the same bits. */
 typedef struct hapi_pack_work {
+  /* Sets the blocks of packs that are stale. */
+  void (*couple)(struct hapi_packs *packs);
   /* Adds what the impulses do to v. */
   void (*push)(const struct hapi_packs *packs, double (*v)[6]);
   void (*sweep)(const struct hapi_packs *packs, double (*v)[6], bool forward, hapi_corrections *io);
-  /* See sweep_way in contact_solver.c: J, and the next begin. */
-  double (*way_energy)(const double *now, const double *begin, const double *response,
-                       size_t count);
+  /* See sweep_way in contact_solver.c: the next begin. */
   void (*way_go_on)(double *now, double *begin, double *way, double share, size_t count);
   /* The rows of all lanes, HAPI_LANES a pack. */
   void (*aggregate)(const struct hapi_packs *packs, double (*v)[6], hapi_aggregate_row *out);
@@ -98,23 +119,31 @@ typedef struct hapi_packed_rows {
   uint32_t body_count;
 } hapi_packed_rows;
 
+/* Scratch, while the packs are made. */
+typedef struct hapi_pack_plan {
+  uint32_t *order; /* of the units; HAPI_LANES x contact_capacity, as the next */
+  uint32_t *sorted;
+  uint32_t *levels; /* by body, as the next: contacts between it and what does not respond */
+  uint64_t *colors; /* one bit each */
+} hapi_pack_plan;
+
 typedef struct hapi_packs {
   const hapi_pack_work *work; /* NULL: nothing is packed */
   hapi_pack *of;              /* contact_capacity, as the next four */
   hapi_pack_contact *contacts;
+  hapi_pack_block *blocks;          /* HAPI_PACK_BLOCKS(contact_capacity) */
   double (*impulse)[3][HAPI_LANES]; /* N s, by contact */
-  double (*response)[3][HAPI_LANES];
-  hapi_packable *packables; /* HAPI_LANES x contact_capacity, as the next four */
+  hapi_packable *packables;         /* HAPI_LANES x contact_capacity, as the next two */
   hapi_pack_unit *units;
-  uint32_t *order; /* of the units */
-  uint32_t *sorted;
   hapi_loose_rows *loose;
-  uint32_t *levels; /* by body, as the next: contacts between it and what does not respond */
-  uint64_t *colors; /* by body, one bit each; capacity as of the solver's v */
+  hapi_pack_plan plan;
+  double (*inverse_inertia)[9]; /* in: by body, of what answers by its mass: world, 1/(kg m^2) */
+  hapi_aggregate *aggregate;    /* NULL: no steps of all pairs */
   uint32_t contact_capacity;
   uint32_t body_capacity;
   uint32_t count; /* packs; 0: all rows are loose */
   uint32_t contact_count;
+  uint32_t block_count;
   uint32_t packable_count;
   uint32_t unit_count;
   uint32_t loose_count;
@@ -122,7 +151,6 @@ typedef struct hapi_packs {
   uint32_t height; /* the highest level; 0: not known */
   bool in_use;     /* the impulses of packed rows are here */
   hapi_packed_rows known;
-  hapi_aggregate *aggregate; /* NULL: no steps */
 } hapi_packs;
 
 extern const hapi_pack_work hapi_pack_work_pairs;       /* on every processor */

@@ -63,16 +63,17 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(rows.solver.work, tick->rows.solver.work_count),
       ARRAY(rows.solver.packs.of, packs),
       ARRAY(rows.solver.packs.contacts, packs),
+      ARRAY(rows.solver.packs.blocks, HAPI_PACK_BLOCKS(packs)),
       ARRAY(rows.solver.packs.impulse, packs),
-      ARRAY(rows.solver.packs.response, packs),
       ARRAY(rows.solver.packs.packables, HAPI_LANES * packs),
       ARRAY(rows.solver.packs.units, HAPI_LANES * packs),
-      ARRAY(rows.solver.packs.order, HAPI_LANES * packs),
-      ARRAY(rows.solver.packs.sorted, HAPI_LANES * packs),
+      ARRAY(rows.solver.packs.plan.order, HAPI_LANES * packs),
+      ARRAY(rows.solver.packs.plan.sorted, HAPI_LANES * packs),
       ARRAY(rows.solver.packs.loose, HAPI_LANES * packs + 1),
-      ARRAY(rows.solver.packs.levels, places),
-      ARRAY(rows.solver.packs.colors, places),
+      ARRAY(rows.solver.packs.plan.levels, places),
+      ARRAY(rows.solver.packs.plan.colors, places),
       ARRAY(rows.solver.packs.aggregate, 1),
+      ARRAY(rows.solver.packs.inverse_inertia, places),
   };
   memcpy(out, all, sizeof all);
 }
