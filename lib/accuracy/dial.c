@@ -31,12 +31,12 @@ typedef struct tick_row {
 static const tick_row tick_rows[] = {
     {0, 50.0, 300, 0.1, 1, false},
     {10, 50.0, 300, 0.1, 4, true},
-    {20, 100.0, 600, 0.05, HAP_RANGE_ALL, true},
-    {30, 100.0, 1250, 0.05, HAP_RANGE_ALL, true},
-    {40, 200.0, 2500, 0.02, HAP_RANGE_ALL, true},
-    {50, 200.0, 20000, 0.01, HAP_RANGE_ALL, true},
-    {70, 333.0, 20000, 0.003, HAP_RANGE_ALL, true},
-    {80, 500.0, 20000, 0.001, HAP_RANGE_ALL, true},
+    {20, 100.0, 600, 0.1, HAP_RANGE_ALL, true},
+    {30, 100.0, 1250, 0.1, HAP_RANGE_ALL, true},
+    {40, 200.0, 2500, 0.05, HAP_RANGE_ALL, true},
+    {50, 200.0, 20000, 0.03, HAP_RANGE_ALL, true},
+    {70, 333.0, 20000, 0.01, HAP_RANGE_ALL, true},
+    {80, 500.0, 20000, 0.003, HAP_RANGE_ALL, true},
     {100, 1000.0, 20000, 0.0, HAP_RANGE_ALL, true},
 };
 
