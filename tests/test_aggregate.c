@@ -225,8 +225,8 @@ static double energy_of(const problem *p)
   for (uint32_t i = 0; i < p->solver.row_count; ++i) {
     const hapi_row *row = &p->rows[i];
     double made = six_dot(row->ja, dv[row->a]) + six_dot(row->jb, dv[row->b]);
-    double asked = row->target - six_dot(row->ja, p->free_v[row->a]) -
-                   six_dot(row->jb, p->free_v[row->b]);
+    double asked =
+        row->target - six_dot(row->ja, p->free_v[row->a]) - six_dot(row->jb, p->free_v[row->b]);
     energy += row->impulse * (0.5 * made - asked);
   }
   return energy;

@@ -9,10 +9,10 @@
 #include "base/vec.h"
 #include "solver/packs.h"
 
-#define ROUNDS 3            /* of normals that would pull and are left out */
-#define PIVOT_LEAST 1e-9    /* of the diagonal */
-#define UPDATE_MADDS 12u    /* that take as long as a row update */
-#define COST_SWEEPS 4u      /* a step may cost as much as so many sweeps */
+#define ROUNDS 3         /* of normals that would pull and are left out */
+#define PIVOT_LEAST 1e-9 /* of the diagonal */
+#define UPDATE_MADDS 12u /* that take as long as a row update */
+#define COST_SWEEPS 4u   /* a step may cost as much as so many sweeps */
 #define NONE UINT16_MAX
 
 /* ---- plan ---- */
@@ -219,9 +219,8 @@ static void matrix_make(hapi_aggregate *w)
   }
   for (uint32_t n = 0; n < w->neighbour_count; ++n) {
     const hapi_aggregate_neighbours *at = &w->neighbours[n];
-    w->matrix[w->begin[at->row] + at->before - w->first[at->row]] +=
-        side_response(&w->rows[w->slot[at->row]], at->side, &w->rows[w->slot[at->before]],
-                      at->side_before);
+    w->matrix[w->begin[at->row] + at->before - w->first[at->row]] += side_response(
+        &w->rows[w->slot[at->row]], at->side, &w->rows[w->slot[at->before]], at->side_before);
   }
 }
 

@@ -11,9 +11,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define HAPI_AGGREGATE_SLOTS 512u     /* lanes of packs; with more there are no steps */
-#define HAPI_AGGREGATE_BODIES 512u    /* likewise */
-#define HAPI_AGGREGATE_MATRIX 8192u   /* numbers in the envelope, likewise */
+#define HAPI_AGGREGATE_SLOTS 512u       /* lanes of packs; with more there are no steps */
+#define HAPI_AGGREGATE_BODIES 512u      /* likewise */
+#define HAPI_AGGREGATE_MATRIX 8192u     /* numbers in the envelope, likewise */
 #define HAPI_AGGREGATE_NEIGHBOURS 2048u /* pairs of pairs with a body in common, likewise */
 
 /* The normals of a pair that push, in shares of their impulses, as one row. */
@@ -39,8 +39,8 @@ typedef struct hapi_aggregate_neighbours {
 typedef struct hapi_aggregate {
   uint32_t count; /* 0: no steps */
   uint32_t neighbour_count;
-  uint32_t cost; /* of a step, in row updates */
-  uint16_t slot[HAPI_AGGREGATE_SLOTS]; /* pack x HAPI_LANES + lane, of the rows */
+  uint32_t cost;                        /* of a step, in row updates */
+  uint16_t slot[HAPI_AGGREGATE_SLOTS];  /* pack x HAPI_LANES + lane, of the rows */
   uint16_t first[HAPI_AGGREGATE_SLOTS]; /* column of the envelope */
   uint32_t begin[HAPI_AGGREGATE_SLOTS]; /* of a row in the matrix, its diagonal comes last */
   hapi_aggregate_neighbours neighbours[HAPI_AGGREGATE_NEIGHBOURS];
