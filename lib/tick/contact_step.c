@@ -112,13 +112,13 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
     }
     body_begin(body, patches);
     body->row = solver->body_count++;
-    if (solver->packs.work != NULL) {
-      memcpy(solver->packs.inverse_inertia[body->row], body->inverse_inertia,
-             sizeof body->inverse_inertia);
-    }
     if (!body_begin_still(body, facts->period, solver)) {
       hapi_still_end(bodies, body);
       body_begin_awake(bodies, body, stays, facts->period, solver);
+    }
+    if (solver->packs.work != NULL) {
+      memcpy(solver->packs.inverse_inertia[body->row], body->inverse_inertia,
+             sizeof body->inverse_inertia);
     }
   }
 }
