@@ -694,11 +694,12 @@ static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t time
 
 /* Pairs of bodies are solved all at once (aggregate.h) from the second sweep on, before each
  * fourth, while that takes what sweeps correct to a quarter. */
-static bool pairs_are_due(const hapi_solver *solver, double corrected)
+static bool pairs_are_due(const hapi_solver *solver, double corrected, uint64_t left)
 {
   const hapi_aggregate *all = solver->packs.aggregate;
   return solver->packs.in_use && all != NULL && all->count > 0 && solver->sweeps >= 2 &&
-         (solver->sweeps - 2) % PAIRS_EACH == 0 && solver->corrected < PAIRS_FALL * corrected;
+         (solver->sweeps - 2) % PAIRS_EACH == 0 && solver->corrected < PAIRS_FALL * corrected &&
+         left >= (uint64_t)all->cost + sweep_cost(solver);
 }
 
 /* Whether what is due is little enough for the next run. tried: direct solves lead to nothing
@@ -786,7 +787,7 @@ void hapi_solver_run(hapi_solver *solver)
         (solver->sweeps >= 2 && (enough || left < cost || solver->sweeps == solver->max_sweeps))) {
       break;
     }
-    if (pairs_are_due(solver, at_pairs)) {
+    if (pairs_are_due(solver, at_pairs, left)) {
       at_pairs = solver->corrected;
       (void)hapi_aggregate_step(&solver->packs, solver->v);
       updates_spend(solver, &left, solver->packs.aggregate->cost);
