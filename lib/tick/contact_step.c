@@ -37,6 +37,7 @@
 #define COARSE_REST 1e-12 /* J a body, of a sweep's corrections that stay undone in a tick */
 #define COARSE_MOST 1e-10 /* the most, under a hand */
 #define COARSE_FADE 0.98  /* a tick */
+#define COARSE_LEVELS 8.0 /* of a stack: a higher one leans by the square of its height */
 
 /* A tick whose solves have taken half as many row updates again as is usual, or what is done within
  * 20 us, leaves the rest to the next ticks, where the rest is little. */
@@ -451,10 +452,12 @@ static void rows_note_unsolved(hapi_rows *rows)
 static void rows_set_coarse(hapi_rows *rows, bool reaches)
 {
   bool touches = rows->hand < HUGE_VAL;
+  double high = hapi_max((double)rows->solver.packs.height / COARSE_LEVELS, 1.0);
+  double drift = rows->drift / (high * high);
   double before = rows->touched ? rows->solver.coarse : 0.0;
   rows->touched = reaches && (rows->touched || touches);
   if (touches) {
-    before = hapi_max(rows->drift * rows->drift * rows->hand, COARSE_FADE * before);
+    before = hapi_max(drift * drift * rows->hand, COARSE_FADE * before);
   }
   double most = (rows->touched ? COARSE_MOST : COARSE_REST) * (double)rows->solver.body_count;
   most = rows->drift > 0.0 ? most : 0.0;
