@@ -99,7 +99,7 @@ static HAPI_FOUR_INLINE void screw_clear(lanes_screw *out)
   }
 }
 
-static HAPI_FOUR_INLINE void twist_gather(double *v, const uint32_t at[HAPI_LANES],
+static HAPI_FOUR_INLINE void twist_gather(const double *v, const uint32_t at[HAPI_LANES],
                                           lanes_twist *out)
 {
   const double *const rows[HAPI_LANES] = {v + at[0], v + at[1], v + at[2], v + at[3]};
