@@ -8,6 +8,7 @@
 
 #include <stdint.h>
 
+#include "solver/aggregate.h"
 #include "solver/contact_solver.h"
 #include "solver/pack_choice.h"
 
@@ -209,6 +210,12 @@ static void tree_make(problem *p, const hapi_pack_work *work, uint64_t seed)
   }
 }
 
+static void packs_begin(void)
+{
+  REQUIRE(hapi_packs_begin(&one.solver.packs, one.rows, one.solver.row_count, BODIES));
+  hapi_aggregate_plan(&one.solver.packs);
+}
+
 /* J: half of impulse x A x impulse, less what the errors without impulses ask for. */
 static double energy_of(const problem *p)
 {
@@ -237,7 +244,7 @@ TEST(energy_falls_by_what_a_step_says)
   double most = 0.0;
   for (uint64_t seed = 1; seed <= 40; ++seed) {
     tree_make(&one, hapi_pack_work_best(), seed);
-    REQUIRE(hapi_packs_begin(&one.solver.packs, one.rows, one.solver.row_count, BODIES));
+    packs_begin();
     REQUIRE(one.solver.packs.aggregate->count > BODIES / 2);
     for (int step = 0; step < 4; ++step) {
       hapi_corrections sum = {0.0, 0.0};
@@ -262,7 +269,7 @@ TEST(a_step_moves_normals_and_bodies_together)
     static double friction[ROWS];
     hapi_corrections sum = {0.0, 0.0};
     tree_make(&one, hapi_pack_work_best(), seed);
-    REQUIRE(hapi_packs_begin(&one.solver.packs, one.rows, one.solver.row_count, BODIES));
+    packs_begin();
     one.solver.packs.work->sweep(&one.solver.packs, one.v, true, &sum);
     hapi_packs_store(&one.solver.packs, one.rows);
     for (uint32_t i = 0; i < one.solver.row_count; ++i) {
@@ -309,7 +316,7 @@ TEST(the_bits_are_the_same_by_pairs_and_in_plain_c)
 TEST(what_is_no_number_ends_no_step_in_the_velocities_of_others)
 {
   tree_make(&one, hapi_pack_work_best(), 3);
-  REQUIRE(hapi_packs_begin(&one.solver.packs, one.rows, one.solver.row_count, BODIES));
+  packs_begin();
   one.v[BODIES - 1][0] = NAN;
   CHECK(hapi_aggregate_step(&one.solver.packs, one.v) == 0.0);
   for (uint32_t i = 1; i + 1 < BODIES; ++i) {

@@ -11,6 +11,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "solver/packs.h"
+
 #define HAPI_AGGREGATE_SLOTS 512u       /* lanes of packs; with more there are no steps */
 #define HAPI_AGGREGATE_BODIES 512u      /* likewise */
 #define HAPI_AGGREGATE_MATRIX 8192u     /* numbers in the envelope, likewise */
@@ -53,12 +55,10 @@ typedef struct hapi_aggregate {
   double growth[HAPI_AGGREGATE_SLOTS]; /* by slot, of the impulses: change / sum */
 } hapi_aggregate;
 
-struct hapi_packs;
-
 /* After the packs are made. */
-void hapi_aggregate_plan(struct hapi_packs *packs);
+void hapi_aggregate_plan(hapi_packs *packs);
 
 /* [haptic] One step; the energy that it takes, J, twice. */
-double hapi_aggregate_step(struct hapi_packs *packs, double (*v)[6]);
+double hapi_aggregate_step(hapi_packs *packs, double (*v)[6]);
 
 #endif

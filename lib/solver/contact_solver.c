@@ -8,6 +8,7 @@
 
 #include "base/assert.h"
 #include "base/vec.h"
+#include "solver/aggregate.h"
 
 /* A direct solve follows each of so many sweeps, then only each so-many-th: where the active sets
  * go in circles, sweeps lead out. */
@@ -694,12 +695,25 @@ static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t time
 
 /* Pairs of bodies are solved all at once (aggregate.h) from the second sweep on, before each
  * fourth, while that takes what sweeps correct to a quarter. */
-static bool pairs_are_due(const hapi_solver *solver, double corrected, uint64_t left)
+static bool pairs_are_due(const hapi_solver *solver, double corrected)
+{
+  return solver->packs.in_use && solver->packs.aggregate != NULL && solver->sweeps >= 2 &&
+         (solver->sweeps - 2) % PAIRS_EACH == 0 && solver->corrected < PAIRS_FALL * corrected;
+}
+
+/* Its cost in row updates, of `left`; 0: there is none. */
+static uint32_t pairs_solve(hapi_solver *solver, uint64_t left)
 {
   const hapi_aggregate *all = solver->packs.aggregate;
-  return solver->packs.in_use && all != NULL && all->count > 0 && solver->sweeps >= 2 &&
-         (solver->sweeps - 2) % PAIRS_EACH == 0 && solver->corrected < PAIRS_FALL * corrected &&
-         left >= (uint64_t)all->cost + sweep_cost(solver);
+  if (solver->packs.known.anew) {
+    hapi_aggregate_plan(&solver->packs);
+    solver->packs.known.anew = false;
+  }
+  if (all->count == 0 || left < (uint64_t)all->cost + sweep_cost(solver)) {
+    return 0;
+  }
+  (void)hapi_aggregate_step(&solver->packs, solver->v);
+  return all->cost;
 }
 
 /* Whether what is due is little enough for the next run. tried: direct solves lead to nothing
@@ -787,10 +801,10 @@ void hapi_solver_run(hapi_solver *solver)
         (solver->sweeps >= 2 && (enough || left < cost || solver->sweeps == solver->max_sweeps))) {
       break;
     }
-    if (pairs_are_due(solver, at_pairs, left)) {
-      at_pairs = solver->corrected;
-      (void)hapi_aggregate_step(&solver->packs, solver->v);
-      updates_spend(solver, &left, solver->packs.aggregate->cost);
+    uint32_t of_pairs = pairs_are_due(solver, at_pairs) ? pairs_solve(solver, left) : 0;
+    if (of_pairs > 0) {
+      at_pairs = before[0];
+      updates_spend(solver, &left, of_pairs);
       way.begun = false;
       before[0] = before[1] = 0.0;
     }

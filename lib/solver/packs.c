@@ -288,7 +288,7 @@ static void packs_add(hapi_packs *packs, const hapi_row *rows)
   uint32_t lanes = 0;
   uint32_t last = UINT32_MAX;
   for (uint32_t i = 0; i < packs->unit_count; i += lanes) {
-    const uint32_t *units = &packs->plan.order[i];
+    const uint32_t *units = packs->plan.order + i;
     uint32_t key = key_of_color(&packs->units[units[0]]);
     lanes = 1;
     while (lanes < HAPI_LANES && i + lanes < packs->unit_count &&
@@ -454,9 +454,7 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
       packs->count = 0;
       return false;
     }
-    if (packs->aggregate != NULL) {
-      hapi_aggregate_plan(packs);
-    }
+    packs->known.anew = true;
   }
   packs_fill(packs, rows);
   packs->known.filled = packs->known.made;

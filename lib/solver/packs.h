@@ -12,7 +12,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "solver/aggregate.h"
 #include "solver/row.h"
 
 #define HAPI_LANES 4u
@@ -94,6 +93,8 @@ typedef struct hapi_corrections {
 /* Blocks of so many contacts, at most. */
 #define HAPI_PACK_BLOCKS(contacts) ((size_t)(contacts) * (HAPI_PACK_CONTACTS - 1) / 2 + 1)
 
+struct hapi_aggregate; /* solver/aggregate.h */
+struct hapi_aggregate_row;
 struct hapi_packs;
 
 /* How the packs are worked on; by what the processor can, with the same bits. */
@@ -106,7 +107,7 @@ typedef struct hapi_pack_work {
   /* See sweep_way in contact_solver.c: the next begin. */
   void (*way_go_on)(double *now, double *begin, double *way, double share, size_t count);
   /* The rows of all lanes, HAPI_LANES a pack. */
-  void (*aggregate)(const struct hapi_packs *packs, double (*v)[6], hapi_aggregate_row *out);
+  void (*aggregate)(const struct hapi_packs *packs, double (*v)[6], struct hapi_aggregate_row *out);
 } hapi_pack_work;
 
 /* What is known of the rows. */
@@ -117,6 +118,7 @@ typedef struct hapi_packed_rows {
   uint32_t held;      /* and when the packs were filled */
   uint32_t row_count; /* all rows, when the packs were made */
   uint32_t body_count;
+  bool anew; /* the packs are others since all pairs were planned (solver/aggregate.h) */
 } hapi_packed_rows;
 
 /* Scratch, while the packs are made. */
@@ -138,7 +140,7 @@ typedef struct hapi_packs {
   hapi_loose_rows *loose;
   hapi_pack_plan plan;
   double (*inverse_inertia)[9]; /* in: by body, of what answers by its mass: world, 1/(kg m^2) */
-  hapi_aggregate *aggregate;    /* NULL: no steps of all pairs */
+  struct hapi_aggregate *aggregate; /* NULL: no steps of all pairs */
   uint32_t contact_capacity;
   uint32_t body_capacity;
   uint32_t count; /* packs; 0: all rows are loose */

@@ -18,6 +18,7 @@
 #include "paper/render.h"
 #include "pointer/coupling.h"
 #include "pointer/proxy.h"
+#include "solver/aggregate.h"
 #include "tick/report.h"
 
 #define ARRAY(member, count)                      \
