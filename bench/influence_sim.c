@@ -157,15 +157,8 @@ static void sim_near(void *data, dGeomID a, dGeomID b)
       ry == INFLUENCE_ABSENT) {
     return;
   }
-  int count = dCollide(a, b, CONTACTS_MOST, &contacts[0].geom, sizeof contacts[0]);
+  int count = peer_ode_touch(sim->world, a, b, CONTACTS_MOST, contacts);
   for (int i = 0; i < count; ++i) {
-    const dReal *n = contacts[i].geom.normal;
-    if (dCalcVectorDot3(n, n) < 0.98) {
-      continue; /* ODE would abort on a contact without a normal */
-    }
-    memset(&contacts[i].surface, 0, sizeof contacts[i].surface);
-    contacts[i].surface.mode = dContactApprox1;
-    contacts[i].surface.mu = sim->world->mu;
     dJointID joint = dJointCreateContact(sim->ode.world, sim->group, &contacts[i]);
     dJointAttach(joint, x, y);
     contact_note(sim, joint, &contacts[i], box_of(x), box_of(y));

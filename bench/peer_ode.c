@@ -116,6 +116,24 @@ bool peer_ode_collides(const peer_world *world, dGeomID a, dGeomID b)
   return (x != NULL || y != NULL) && (x == NULL || y == NULL || !world->boxes_pass);
 }
 
+int peer_ode_touch(const peer_world *world, dGeomID a, dGeomID b, int most, dContact *out)
+{
+  int found = dCollide(a, b, most, &out[0].geom, sizeof out[0]);
+  int count = 0;
+  for (int i = 0; i < found; ++i) {
+    const dReal *n = out[i].geom.normal;
+    if (dCalcVectorDot3(n, n) < 0.98) {
+      continue; /* ODE would abort on a contact without a normal */
+    }
+    out[count].geom = out[i].geom;
+    memset(&out[count].surface, 0, sizeof out[count].surface);
+    out[count].surface.mode = dContactApprox1;
+    out[count].surface.mu = world->mu;
+    ++count;
+  }
+  return count;
+}
+
 /* ---- the engine ---- */
 
 static void ode_near(void *data, dGeomID a, dGeomID b)
@@ -130,15 +148,8 @@ static void ode_near(void *data, dGeomID a, dGeomID b)
   if (!peer_ode_collides(world, a, b) || (x_rests && y_rests)) {
     return;
   }
-  int count = dCollide(a, b, peer_ode_contacts(world), &contacts[0].geom, sizeof contacts[0]);
+  int count = peer_ode_touch(world, a, b, peer_ode_contacts(world), contacts);
   for (int i = 0; i < count; ++i) {
-    const dReal *n = contacts[i].geom.normal;
-    if (dCalcVectorDot3(n, n) < 0.98) {
-      continue; /* ODE would abort on a contact without a normal */
-    }
-    memset(&contacts[i].surface, 0, sizeof contacts[i].surface);
-    contacts[i].surface.mode = dContactApprox1;
-    contacts[i].surface.mu = world->mu;
     dJointAttach(dJointCreateContact(sim->w.world, sim->contacts, &contacts[i]), x, y);
   }
 }

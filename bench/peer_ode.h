@@ -29,4 +29,7 @@ int peer_ode_contacts(const peer_world *world);
 /* Whether a pair collides. */
 bool peer_ode_collides(const peer_world *world, dGeomID a, dGeomID b);
 
+/* The contacts of a pair, with the world's surface; returns how many, at most `most`. */
+int peer_ode_touch(const peer_world *world, dGeomID a, dGeomID b, int most, dContact *out);
+
 #endif

@@ -6,54 +6,14 @@
 
 #include "tests/tap.h"
 
-#include <stdint.h>
+#include "tests/pack_problem.h"
 
-#include "solver/aggregate.h"
-#include "solver/contact_solver.h"
-#include "solver/pack_choice.h"
-
-#define BODIES 48u
 #define CUBE 0.05 /* kg */
-#define PAIRS (2 * BODIES)
-#define PAIR_CONTACTS 4u
-#define ROWS (3 * PAIRS * PAIR_CONTACTS)
-#define PACKS (PAIRS * PAIR_CONTACTS)
-#define WORK HAPI_SOLVER_WORK(2 * ROWS, BODIES)
-
-void plain_hapi_solver_run(hapi_solver *solver);
-extern const hapi_pack_work plain_hapi_pack_work_pairs;
-
-typedef struct problem {
-  hapi_row rows[ROWS];
-  double v[BODIES][6];
-  double free_v[BODIES][6];
-  double work[WORK];
-  hapi_pack packs[PACKS];
-  hapi_pack_contact contacts[PACKS];
-  double impulse[PACKS][3][HAPI_LANES];
-  hapi_pack_block blocks[HAPI_PACK_BLOCKS(PACKS)];
-  double inverse_inertia[BODIES][9];
-  hapi_packable packables[HAPI_LANES * PACKS];
-  hapi_pack_unit units[HAPI_LANES * PACKS];
-  uint32_t order[HAPI_LANES * PACKS];
-  uint32_t sorted[HAPI_LANES * PACKS];
-  hapi_loose_rows loose[HAPI_LANES * PACKS + 1];
-  uint32_t levels[BODIES];
-  uint64_t colors[BODIES];
-  hapi_aggregate aggregate;
-  hapi_solver solver;
-  double warm; /* N s, of each normal */
-} problem;
 
 static problem one;
 static problem two;
 static uint64_t state;
-
-static double random_next(void) /* -1 .. 1 */
-{
-  state = state * 6364136223846793005u + 1442695040888963407u;
-  return (double)(int64_t)state / 9.3e18;
-}
+static double warm; /* N s, of each normal */
 
 static double six_dot(const double a[6], const double b[6])
 {
@@ -63,35 +23,16 @@ static double six_dot(const double a[6], const double b[6])
 static void problem_begin(problem *p, const hapi_pack_work *work, bool pairs)
 {
   memset(p, 0, sizeof *p);
-  p->solver.rows = p->rows;
-  p->solver.v = p->v;
-  p->solver.free = p->free_v;
-  p->solver.work = p->work;
-  p->solver.work_count = WORK;
+  problem_link(p, work);
   p->solver.body_count = BODIES;
   p->solver.update_budget = UINT32_MAX;
   p->solver.ready = true;
-  p->solver.packs.work = work;
-  p->solver.packs.of = p->packs;
-  p->solver.packs.contacts = p->contacts;
-  p->solver.packs.impulse = p->impulse;
-  p->solver.packs.blocks = p->blocks;
-  p->solver.packs.inverse_inertia = p->inverse_inertia;
+  p->solver.packs.aggregate = pairs ? &p->aggregate : NULL;
   for (uint32_t i = 1; i < BODIES; ++i) {
     for (int k = 0; k < 3; ++k) {
       p->inverse_inertia[i][4 * k] = 1.0 / (CUBE * 4e-4);
     }
   }
-  p->solver.packs.packables = p->packables;
-  p->solver.packs.units = p->units;
-  p->solver.packs.plan.order = p->order;
-  p->solver.packs.plan.sorted = p->sorted;
-  p->solver.packs.loose = p->loose;
-  p->solver.packs.plan.levels = p->levels;
-  p->solver.packs.plan.colors = p->colors;
-  p->solver.packs.contact_capacity = PACKS;
-  p->solver.packs.body_capacity = BODIES;
-  p->solver.packs.aggregate = pairs ? &p->aggregate : NULL;
 }
 
 /* Contacts of two bodies across x at points of a square, 3 rows each. b 0: the static world. */
@@ -99,8 +40,8 @@ static void pair_add(problem *p, uint32_t a, uint32_t b, uint32_t contacts, doub
 {
   for (uint32_t c = 0; c < contacts; ++c) {
     uint32_t first = p->solver.row_count;
-    double y = (c % 2 == 0 ? 0.01 : -0.01) * (1.0 + 0.3 * random_next());
-    double z = (c / 2 == 0 ? 0.01 : -0.01) * (1.0 + 0.3 * random_next());
+    double y = (c % 2 == 0 ? 0.01 : -0.01) * (1.0 + 0.3 * random_next(&state));
+    double z = (c / 2 == 0 ? 0.01 : -0.01) * (1.0 + 0.3 * random_next(&state));
     const double x = b == 0 ? 0.0 : 0.02;
     const double directions[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
     for (uint32_t i = 0; i < 3; ++i) {
@@ -124,7 +65,7 @@ static void pair_add(problem *p, uint32_t a, uint32_t b, uint32_t contacts, doub
       row->hi = i == 0 ? HUGE_VAL : 0.0;
       row->mu = i == 0 ? 0.0 : mu;
       row->normal = i == 0 ? -1 : (int32_t)first;
-      row->impulse = i == 0 ? p->warm : 0.0;
+      row->impulse = i == 0 ? warm : 0.0;
     }
     p->solver.row_count += 3;
     hapi_contact_ready(&p->solver, first, 3, true);
@@ -138,7 +79,7 @@ static void pair_add(problem *p, uint32_t a, uint32_t b, uint32_t contacts, doub
 static void row_make(problem *p, const hapi_pack_work *work, bool pairs)
 {
   problem_begin(p, work, pairs);
-  p->warm = 1e-4;
+  warm = 1e-4;
   state = 7;
   p->v[BODIES - 1][0] = p->free_v[BODIES - 1][0] = -SPEED;
   for (uint32_t i = 1; i + 1 < BODIES; ++i) {
@@ -194,17 +135,18 @@ TEST(a_row_of_cubes_is_near_its_end_after_a_few_sweeps)
 static void tree_make(problem *p, const hapi_pack_work *work, uint64_t seed)
 {
   problem_begin(p, work, true);
+  warm = 0.0;
   state = seed;
   for (uint32_t i = 1; i < BODIES; ++i) {
     for (int k = 0; k < 6; ++k) {
-      p->v[i][k] = p->free_v[i][k] = (k < 3 ? 0.1 : 1.0) * random_next();
+      p->v[i][k] = p->free_v[i][k] = (k < 3 ? 0.1 : 1.0) * random_next(&state);
     }
   }
   for (uint32_t i = 1; i < BODIES; ++i) {
-    uint32_t before = i > 3 ? i - 1 - (uint32_t)(1.0 + random_next()) : i - 1;
-    uint32_t contacts = 1 + (uint32_t)(2.0 * (1.0 + random_next()));
+    uint32_t before = i > 3 ? i - 1 - (uint32_t)(1.0 + random_next(&state)) : i - 1;
+    uint32_t contacts = 1 + (uint32_t)(2.0 * (1.0 + random_next(&state)));
     pair_add(p, i, before, contacts < 4 ? contacts : 4, 0.4);
-    if (random_next() > 0.0 && before != 0) {
+    if (random_next(&state) > 0.0 && before != 0) {
       pair_add(p, i, 0, 2, 0.4);
     }
   }
@@ -309,6 +251,51 @@ TEST(the_bits_are_the_same_by_pairs_and_in_plain_c)
     plain_hapi_solver_run(&two.solver);
     CHECK(memcmp(one.v, two.v, sizeof one.v) == 0);
   }
+}
+
+/* ---- where steps are made ---- */
+
+#define SIDE 6 /* bodies of a square that each touch four others and the floor, as in a pile */
+
+static void square_make(problem *p)
+{
+  problem_begin(p, hapi_pack_work_best(), true);
+  state = 5;
+  warm = 0.0;
+  for (uint32_t i = 0; i < SIDE * SIDE; ++i) {
+    pair_add(p, 1 + i, 0, PAIR_CONTACTS, 0.4);
+    if (i % SIDE > 0) {
+      pair_add(p, 1 + i, i, 1, 0.4);
+    }
+    if (i >= SIDE && p->solver.row_count + 3 * PAIR_CONTACTS < ROWS) {
+      pair_add(p, 1 + i, 1 + i - SIDE, 1, 0.4);
+    }
+  }
+}
+
+/* Loads of bodies that touch many others are not determined: sweeps alone say which they are. */
+TEST(bodies_that_touch_many_others_take_no_steps)
+{
+  square_make(&one);
+  packs_begin();
+  CHECK(one.solver.packs.count > 0);
+  CHECK(one.solver.packs.aggregate->count == 0);
+  memset(&one.aggregate, 0, sizeof one.aggregate);
+  row_make(&one, hapi_pack_work_best(), true);
+  packs_begin();
+  CHECK(one.solver.packs.aggregate->count == BODIES - 2);
+}
+
+/* A tick whose budget is nearly spent makes none. */
+TEST(a_step_is_within_the_budget)
+{
+  row_make(&one, hapi_pack_work_best(), true);
+  row_make(&two, hapi_pack_work_best(), false);
+  one.solver.update_budget = two.solver.update_budget = 1000;
+  hapi_solver_run(&one.solver);
+  hapi_solver_run(&two.solver);
+  CHECK(one.solver.updates <= two.solver.updates);
+  CHECK(memcmp(one.v, two.v, sizeof one.v) == 0);
 }
 
 /* ---- what may be wrong ---- */

@@ -7,43 +7,7 @@
 
 #include "tests/tap.h"
 
-#include <stdint.h>
-
-#include "solver/contact_solver.h"
-#include "solver/pack_choice.h"
-
-#define BODIES 40u
-#define PAIRS 90u
-#define PAIR_CONTACTS 4u
-#define OTHERS 12u
-#define ROWS (3 * PAIRS * PAIR_CONTACTS + OTHERS)
-#define PACKS (PAIRS * PAIR_CONTACTS)
-#define WORK HAPI_SOLVER_WORK(2 * ROWS, BODIES)
-
-void plain_hapi_solver_run(hapi_solver *solver);
-void plain_hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, bool by_mass);
-void plain_hapi_row_ready(hapi_solver *solver, uint32_t index);
-extern const hapi_pack_work plain_hapi_pack_work_pairs;
-
-typedef struct problem {
-  hapi_row rows[ROWS];
-  double v[BODIES][6];
-  double free_v[BODIES][6];
-  double work[WORK];
-  hapi_pack packs[PACKS];
-  hapi_pack_contact contacts[PACKS];
-  hapi_pack_block blocks[HAPI_PACK_BLOCKS(PACKS)];
-  double impulse[PACKS][3][HAPI_LANES];
-  hapi_packable packables[HAPI_LANES * PACKS];
-  hapi_pack_unit units[HAPI_LANES * PACKS];
-  uint32_t order[HAPI_LANES * PACKS];
-  uint32_t sorted[HAPI_LANES * PACKS];
-  hapi_loose_rows loose[HAPI_LANES * PACKS + 1];
-  uint32_t levels[BODIES];
-  uint64_t colors[BODIES];
-  double inverse_inertia[BODIES][9];
-  hapi_solver solver;
-} problem;
+#include "tests/pack_problem.h"
 
 static problem one;
 static problem two;
@@ -51,12 +15,6 @@ static double mass[BODIES];     /* inverse; 0: does not respond */
 static double turns[BODIES][9]; /* inverse inertia, likewise */
 static double centre[BODIES][3];
 static uint64_t state;
-
-static double random_next(void) /* -1 .. 1 */
-{
-  state = state * 6364136223846793005u + 1442695040888963407u;
-  return (double)(int64_t)state / 9.3e18;
-}
 
 static void vector_cross(const double a[3], const double b[3], double out[3])
 {
@@ -77,8 +35,8 @@ static double vector_dot(const double *a, const double *b, int count)
 static void random_frame(double out[3][3])
 {
   for (int k = 0; k < 3; ++k) {
-    out[0][k] = random_next();
-    out[1][k] = random_next();
+    out[0][k] = random_next(&state);
+    out[1][k] = random_next(&state);
   }
   double length = sqrt(vector_dot(out[0], out[0], 3));
   for (int k = 0; k < 3; ++k) {
@@ -93,7 +51,7 @@ static void random_frame(double out[3][3])
     out[1][k] /= length;
   }
   vector_cross(out[0], out[1], out[2]);
-  double hand = random_next() < 0.0 ? -1.0 : 1.0;
+  double hand = random_next(&state) < 0.0 ? -1.0 : 1.0;
   for (int k = 0; k < 3; ++k) {
     out[2][k] *= hand;
   }
@@ -106,8 +64,8 @@ static void random_body(uint32_t body)
   random_frame(axes);
   memset(turns[body], 0, sizeof turns[body]);
   for (int i = 0; i < 3; ++i) {
-    double along = mass[body] * 1000.0 * exp(random_next());
-    centre[body][i] = 0.05 * random_next();
+    double along = mass[body] * 1000.0 * exp(random_next(&state));
+    centre[body][i] = 0.05 * random_next(&state);
     for (int k = 0; k < 9; ++k) {
       turns[body][k] += along * axes[i][k / 3] * axes[i][k % 3];
     }
@@ -132,7 +90,7 @@ static void contact_fill(hapi_row *rows, uint32_t a, uint32_t b, double frame[3]
 {
   double arm[2][3];
   for (int k = 0; k < 3; ++k) {
-    double point = 0.05 * random_next();
+    double point = 0.05 * random_next(&state);
     arm[0][k] = point - centre[a][k];
     arm[1][k] = point - centre[b][k];
   }
@@ -149,7 +107,7 @@ static void contact_fill(hapi_row *rows, uint32_t a, uint32_t b, double frame[3]
     row->hi = i == 0 ? HUGE_VAL : 0.0;
     row->mu = i == 0 ? 0.0 : mu;
     row->normal = -1;
-    row->impulse = i == 0 ? 1e-3 * fabs(random_next()) : 0.0;
+    row->impulse = i == 0 ? 1e-3 * fabs(random_next(&state)) : 0.0;
     row->softness = 0.1;
   }
 }
@@ -165,29 +123,8 @@ static void other_fill(hapi_row *row, uint32_t a)
   row->lo = -0.01;
   row->hi = 0.01;
   row->normal = -1;
-  row->target = 0.1 * random_next();
+  row->target = 0.1 * random_next(&state);
   row->softness = 1e-4;
-}
-
-static void problem_link(problem *p, const hapi_pack_work *work)
-{
-  p->solver.rows = p->rows;
-  p->solver.v = p->v;
-  p->solver.free = p->free_v;
-  p->solver.work = p->work;
-  p->solver.packs.work = work;
-  p->solver.packs.of = p->packs;
-  p->solver.packs.contacts = p->contacts;
-  p->solver.packs.blocks = p->blocks;
-  p->solver.packs.impulse = p->impulse;
-  p->solver.packs.packables = p->packables;
-  p->solver.packs.units = p->units;
-  p->solver.packs.plan.order = p->order;
-  p->solver.packs.plan.sorted = p->sorted;
-  p->solver.packs.loose = p->loose;
-  p->solver.packs.plan.levels = p->levels;
-  p->solver.packs.plan.colors = p->colors;
-  p->solver.packs.inverse_inertia = p->inverse_inertia;
 }
 
 static void contacts_make(problem *p, double mu)
@@ -218,11 +155,11 @@ static void problem_make(problem *p, uint64_t seed, double mu, uint32_t sweeps)
   memset(p, 0, sizeof *p);
   state = seed;
   for (uint32_t i = 0; i < BODIES; ++i) {
-    mass[i] = i == 0 ? 0.0 : i == 9 ? 0.0 : exp(random_next());
+    mass[i] = i == 0 ? 0.0 : i == 9 ? 0.0 : exp(random_next(&state));
     random_body(i);
     memcpy(p->inverse_inertia[i], turns[i], sizeof turns[i]);
     for (int k = 0; k < 6; ++k) {
-      p->v[i][k] = p->free_v[i][k] = i == 0 ? 0.0 : (k < 3 ? 0.1 : 1.0) * random_next();
+      p->v[i][k] = p->free_v[i][k] = i == 0 ? 0.0 : (k < 3 ? 0.1 : 1.0) * random_next(&state);
     }
   }
   contacts_make(p, mu);
@@ -230,10 +167,7 @@ static void problem_make(problem *p, uint64_t seed, double mu, uint32_t sweeps)
   p->solver.tolerance = 1e-12;
   p->solver.update_budget = UINT32_MAX;
   p->solver.max_sweeps = sweeps;
-  p->solver.work_count = WORK;
   p->solver.ready = true;
-  p->solver.packs.contact_capacity = PACKS;
-  p->solver.packs.body_capacity = BODIES;
 }
 
 typedef void (*contact_ready)(hapi_solver *solver, uint32_t first, uint32_t count, bool by_mass);

@@ -156,3 +156,93 @@ TEST(else_they_are_as_far_apart_as_the_solver_lets_them)
   runs_compare(&rough);
   runs_compare(&slippery);
 }
+
+/* ---- what wakes by itself ---- */
+
+static contact_world *world_rest(void)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  stacks_build(w, 0.5);
+  cw_start(w, -0.05, 0.0, EDGE * 2.5);
+  cw_run(w, ticks_of[REST]);
+  REQUIRE(w->session->haptic->tick.bodies.still == 2 * HIGH);
+  return w;
+}
+
+/* The hand holds the highest cube of the first stack, and lifts it. */
+TEST(a_grab_wakes_the_stack_of_its_body)
+{
+  contact_world *w = world_rest();
+  REQUIRE(hap_pointer_attach(w->session, w->hand, w->bodies[HIGH - 1], NULL) == HAP_OK);
+  double before = w->position[HIGH - 1][2];
+  cw_go(w, 0.0, 0.0, 0.05, 400);
+  CHECK_SAY(w->position[HIGH - 1][2] > before + 0.01, "%g m", w->position[HIGH - 1][2] - before);
+}
+
+/* A cube that falls beside it hangs on the highest cube of the second stack from now on. */
+TEST(a_joint_wakes_the_stack_of_its_body)
+{
+  contact_world *w = world_rest();
+  dBodyID top = w->bodies[2 * HIGH - 1];
+  const double before = w->position[2 * HIGH - 1][1];
+  REQUIRE(hap_session_lock(w->session) == HAP_OK);
+  dBodyID hangs = cw_add_cube(w, 1.0, EDGE, 0.0, APART + 2.0 * EDGE, EDGE * (HIGH - 0.5));
+  dJointID ball = dJointCreateBall(w->world, NULL);
+  dJointAttach(ball, top, hangs);
+  dJointSetBallAnchor(ball, 0.0, APART + EDGE, EDGE * (HIGH - 0.5));
+  hap_session_unlock(w->session);
+  cw_run(w, 400);
+  CHECK_SAY(w->position[2 * HIGH - 1][1] > before + 1e-3, "%g m",
+            w->position[2 * HIGH - 1][1] - before);
+}
+
+/* ---- what packs know of bodies ---- */
+
+/* R I^-1 R^T of the pose with which the tick begins; R worked out here from the quaternion. */
+static void inertia_expect(const hapi_local_body *body, double out[9])
+{
+  const double *q = body->pose.quat_wxyz;
+  double s = q[0];
+  const double u[3] = {q[1], q[2], q[3]};
+  double r[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      int l = 3 - i - k;
+      double skew = i == k ? 0.0 : (k - i == 1 || k - i == -2 ? -1.0 : 1.0) * u[l];
+      r[i][k] = 2.0 * (u[i] * u[k] + s * skew) + (i == k ? 2.0 * s * s - 1.0 : 0.0);
+    }
+  }
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      out[3 * i + k] = 0.0;
+      for (int n = 0; n < 9; ++n) {
+        out[3 * i + k] += r[i][n / 3] * body->given.inverse_inertia[n] * r[k][n % 3];
+      }
+    }
+  }
+}
+
+/* They are used for impulses of this tick, so they are those of its poses. */
+TEST(inertias_in_packs_are_those_of_this_ticks_poses)
+{
+  contact_world *w = cw_new(0.0);
+  const double edges[3] = {0.02, 0.06, 0.15};
+  dBodyID box = cw_add_box(w, 0.3, edges, 0.0, 0.0, 0.3);
+  dBodySetAngularVel(box, 3.0, 5.0, 2.0);
+  cw_start_following(w, 0.0, 0.0, 0.2);
+  cw_run(w, 50);
+  hapi_tick *tick = &w->session->haptic->tick;
+  for (int i = 0; i < 20; ++i) {
+    REQUIRE(tick->bodies.live_count == 1);
+    const hapi_local_body *body = &tick->bodies.of[tick->bodies.live[0]];
+    double expected[9];
+    double turned = body->pose.quat_wxyz[1];
+    inertia_expect(body, expected);
+    cw_tick(w);
+    CHECK(body->pose.quat_wxyz[1] != turned);
+    for (int k = 0; k < 9; ++k) {
+      CHECK_NEAR(tick->rows.solver.packs.inverse_inertia[body->row][k], expected[k],
+                 1e-9 * fabs(expected[0] + expected[4] + expected[8]));
+    }
+  }
+}

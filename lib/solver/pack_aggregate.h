@@ -72,13 +72,7 @@ static HAPI_FOUR_INLINE void pack_aggregate(const hapi_packs *packs, const hapi_
   lanes_store3(linear, out->linear);
   aggregate_side(pack->turn_a, moment, 0, out);
   if (paired) {
-    hapi_four across[3];
-    hapi_four more[3];
-    lanes_load3(pack->across, across);
-    lanes_cross(across, linear, more);
-    for (int k = 0; k < 3; ++k) {
-      moment[k] = hapi_four_sub(zero, hapi_four_add(moment[k], more[k]));
-    }
+    lanes_to_b(pack, linear, moment);
     aggregate_side(pack->turn_b, moment, 1, out);
   }
 }

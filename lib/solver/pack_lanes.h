@@ -158,6 +158,21 @@ static HAPI_FOUR_INLINE void twist_push(const double mass[HAPI_LANES],
   }
 }
 
+/* The opposite impulse on b, and its moment about b's centre. */
+static HAPI_FOUR_INLINE void lanes_to_b(const hapi_pack *pack, hapi_four io_linear[3],
+                                        hapi_four io_moment[3])
+{
+  const hapi_four zero = hapi_four_all(0.0);
+  hapi_four across[3];
+  hapi_four more[3];
+  lanes_load3(pack->across, across);
+  lanes_cross(across, io_linear, more);
+  for (int k = 0; k < 3; ++k) {
+    io_moment[k] = hapi_four_sub(zero, hapi_four_add(io_moment[k], more[k]));
+    io_linear[k] = hapi_four_sub(zero, io_linear[k]);
+  }
+}
+
 /* The impulses of a pack to its bodies. */
 static HAPI_FOUR_INLINE void pair_push(const hapi_pack *pack, const lanes_screw *push, bool paired,
                                        lanes_pair *at, double (*v)[6])
@@ -169,15 +184,7 @@ static HAPI_FOUR_INLINE void pair_push(const hapi_pack *pack, const lanes_screw 
   twist_push(pack->mass_a, pack->turn_a, linear, moment, &at->a);
   twist_scatter(&at->a, pack->a, v[0]);
   if (paired) {
-    const hapi_four zero = hapi_four_all(0.0);
-    hapi_four across[3];
-    hapi_four more[3];
-    lanes_load3(pack->across, across);
-    lanes_cross(across, linear, more);
-    for (int k = 0; k < 3; ++k) {
-      moment[k] = hapi_four_sub(zero, hapi_four_add(moment[k], more[k]));
-      linear[k] = hapi_four_sub(zero, linear[k]);
-    }
+    lanes_to_b(pack, linear, moment);
     twist_push(pack->mass_b, pack->turn_b, linear, moment, &at->b);
     twist_scatter(&at->b, pack->b, v[0]);
   }
