@@ -693,8 +693,8 @@ static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t time
          share * share * solver->corrected < solver->coarse;
 }
 
-/* Pairs of bodies are solved all at once (aggregate.h) from the second sweep on, before each
- * fourth, while that takes what sweeps correct to a quarter. */
+/* All pairs of bodies are solved at once (aggregate.h) after two sweeps, then after each four more,
+ * while four sweeps reduce the energy of a sweep's corrections to a quarter or less. */
 static bool pairs_are_due(const hapi_solver *solver, double corrected)
 {
   return solver->packs.in_use && solver->packs.aggregate != NULL && solver->sweeps >= 2 &&
