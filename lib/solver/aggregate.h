@@ -3,10 +3,10 @@
 #ifndef HAPODE_SOLVER_AGGREGATE_H
 #define HAPODE_SOLVER_AGGREGATE_H
 
-/* Sweeps hand a load on by one or two bodies each. A step for all pairs of bodies in packs hands it
- * on at once: one unknown for each pair, the sum of its normals that push, which grow or shrink in
- * proportion. This is the coarse step of an aggregation multigrid. No normal pulls after it, and the
- * energy of the normals only falls. */
+/* Sweeps hand a load on by one or two bodies each. A step for all pairs of bodies in packs hands
+ * it on at once: one unknown for each pair, the sum of its normals that push, which grow or shrink
+ * in proportion. This is the coarse step of an aggregation multigrid. No normal pulls after it, and
+ * the energy of the normals only falls. */
 
 #include <stdbool.h>
 #include <stdint.h>
