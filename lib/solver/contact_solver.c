@@ -38,9 +38,7 @@
  * next runs make them. */
 #define LEAVE 16.0
 #define LEAVE_SWEEPS 3u
-/* Levels: a higher stack is solved at once. Where what slid comes to stick in one of eight, solves
- * that went on from tick to tick were 0.2 to 2 % off, by chance. */
-#define SPREAD_HEIGHT 4u
+#define SPREAD_HEIGHT 8u /* levels: a higher stack is solved at once, one by one (packs.c) */
 /* So is what has more rows: a row of 30 light cubes was 0.8 % off, and 0.5 % solved at once. */
 #define SPREAD_ROWS 300u
 

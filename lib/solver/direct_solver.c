@@ -13,9 +13,13 @@
 
 #define INNER_ROUNDS 2 /* active sets tried from one state */
 #define WORSE 30.0     /* how much the largest correction may grow in a round */
-#define HUBS_MAX 16    /* with more, islands about hubs are solved as others */
-#define HUB_ROUNDS 6   /* steps of the hubs */
-#define LEAF_ROUNDS 6  /* active sets of a leaf, of one step */
+#define FIRM 1e-8      /* R of island.c */
+#define DAMPED 1e-3    /* the same, where such rounds lead to nothing */
+#define DAMPED_ROUNDS 2
+#define DAMPED_RUNS 8 /* that begin so, before others are tried again */
+#define HUBS_MAX 16   /* with more, islands about hubs are solved as others */
+#define HUB_ROUNDS 6  /* steps of the hubs */
+#define LEAF_ROUNDS 6 /* active sets of a leaf, of one step */
 
 /* Lists of rows: of each island, and in it, one after another, of each part that hangs together
  * without hubs. By the lowest body. */
@@ -123,6 +127,32 @@ static bool island_improve(hapi_island *is, double before, bool last, double *ou
   }
   hapi_island_restore(is);
   return better;
+}
+
+/* Where more contacts are taken to stick or to push than can, as in a tower whose cubes come to
+ * slide, the equations have no solution, and impulses grow by 1 / R. With a larger R a round is a
+ * short step (Levenberg and Marquardt), and from the set that it leads to sweeps go on. Each must
+ * leave less energy. Returns the cost in row updates. */
+static uint32_t island_damp(hapi_island *is, uint32_t step, double *io_due, bool *out_better)
+{
+  uint32_t rounds = 0;
+  bool falls = true;
+  is->softening = DAMPED;
+  (void)hapi_island_inspect(is, false);
+  hapi_island_save(is);
+  for (*out_better = false; falls && rounds < DAMPED_ROUNDS; ++rounds) {
+    hapi_island_solve(is);
+    double due = hapi_island_inspect(is, false);
+    falls = hapi_island_rise(is, is->saved_impulse, is->saved_error) < 0.0;
+    if (falls) {
+      *io_due = due;
+      *out_better = true;
+      hapi_island_save(is);
+    }
+  }
+  hapi_island_restore(is);
+  is->softening = FIRM;
+  return rounds * step;
 }
 
 /* ---- islands about hubs ---- */
@@ -342,6 +372,37 @@ static uint32_t mechanism_improve(hapi_island *is, uint32_t step, uint32_t budge
 
 /* ---- all islands ---- */
 
+/* An island of one part; the cost in row updates. */
+static uint32_t solve_whole(hapi_island *is, uint32_t step, uint32_t budget, double *io_due)
+{
+  hapi_solver *solver = is->solver;
+  const uint32_t cost = INNER_ROUNDS * step;
+  const uint32_t damped_cost = DAMPED_ROUNDS * step;
+  bool damped = solver->direct.damped > 0;
+  bool better = false;
+  uint32_t spent = 0;
+  if (damped) {
+    --solver->direct.damped;
+    spent = island_damp(is, step, io_due, &better);
+    (void)hapi_island_inspect(is, false);
+  }
+  if (!better && cost <= budget - spent) {
+    bool last = 2 * (uint64_t)(budget - spent - cost) <= solver->update_budget;
+    better = island_improve(is, *io_due, last, io_due);
+    spent += cost;
+  }
+  solver->direct_solves += better;
+  uint32_t of_mechanism =
+      *io_due > HAPI_COARSE ? mechanism_improve(is, step, budget - spent, io_due) : 0;
+  spent += of_mechanism;
+  if (!damped && !better && of_mechanism == 0 && damped_cost <= budget - spent) {
+    spent += island_damp(is, step, io_due, &better);
+    solver->direct_solves += better;
+    solver->direct.damped = better ? DAMPED_RUNS : 0;
+  }
+  return spent;
+}
+
 /* One island; the cost in row updates. */
 static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, uint32_t budget)
 {
@@ -376,12 +437,7 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
     solver->direct_solves += improve_hubs(is, all, leaf, &hubs, &due);
     spent = budget - hubs.left;
   } else {
-    bool last = 2 * (uint64_t)(budget - cost) <= solver->update_budget;
-    solver->direct_solves += island_improve(is, due, last, &due);
-    spent = cost;
-    if (due > HAPI_COARSE) {
-      spent += mechanism_improve(is, step, budget - spent, &due);
-    }
+    spent = solve_whole(is, step, budget, &due);
   }
   solver->direct.residual = fmax(solver->direct.residual, due);
   return spent;
@@ -402,6 +458,7 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   solver->direct.residual = 0.0;
   is.solver = solver;
   is.held = false;
+  is.softening = FIRM;
   is.gain = solver->work;
   is.error = is.gain + solver->row_count;
   is.saved_error = is.error + solver->row_count;

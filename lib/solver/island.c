@@ -19,7 +19,6 @@
 
 #include "base/assert.h"
 
-#define SOFTENING 1e-8   /* R, relative to the row's own response */
 #define ROW_MADDS 300    /* to assemble, solve and check a row, in multiply-adds */
 #define MADDS_PER_ROW 36 /* multiply-adds in the time of one row update */
 
@@ -87,7 +86,7 @@ static void row_classify(hapi_island *is, uint32_t i, bool at_bound, double hi, 
   row->state = HAPI_ROW_FIXED;
   if (!at_bound || (sticking && row->normal >= 0 && hi > 0.0)) {
     row->state = HAPI_ROW_FREE;
-    is->gain[i] = 1.0 / (row->softness + SOFTENING * row->response);
+    is->gain[i] = 1.0 / (row->softness + is->softening * row->response);
   } else if (row->normal >= 0 && hi > 0.0 && rows[row->normal].state == HAPI_ROW_FREE) {
     row->state = HAPI_ROW_TIED;
     is->gain[i] = (row->impulse > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
@@ -100,7 +99,7 @@ static void row_classify(hapi_island *is, uint32_t i, bool at_bound, double hi, 
  * e, as the two are parallel, e_t = (|e| / F) F_t. */
 static double slip_softness(const hapi_island *is, const hapi_row *row, uint32_t index)
 {
-  return 1.0 / is->gain[index] - row->softness - SOFTENING * row->response;
+  return 1.0 / is->gain[index] - row->softness - is->softening * row->response;
 }
 
 static void slide_ball(hapi_island *is, uint32_t first, double radius, const double wanted[3])
@@ -114,7 +113,7 @@ static void slide_ball(hapi_island *is, uint32_t first, double radius, const dou
   for (uint32_t i = 0; i < row->ball; ++i) {
     row[i].state = HAPI_ROW_SLIDING;
     is->gain[first + i] =
-        1.0 / (fmax(slip, 0.0) / radius + row[i].softness + SOFTENING * row[i].response);
+        1.0 / (fmax(slip, 0.0) / radius + row[i].softness + is->softening * row[i].response);
   }
 }
 
@@ -136,7 +135,7 @@ static double inspect_ball(hapi_island *is, uint32_t first, bool sticking)
   bool inside = !slides || norm2 < (1.0 - 1e-9) * radius * radius;
   for (uint32_t i = 0; i < row->ball && radius > 0.0 && (inside || sticking); ++i) {
     row[i].state = HAPI_ROW_FREE;
-    is->gain[first + i] = 1.0 / (row[i].softness + SOFTENING * row[i].response);
+    is->gain[first + i] = 1.0 / (row[i].softness + is->softening * row[i].response);
     ++is->free_rows;
   }
   if (radius > 0.0 && row->state == HAPI_ROW_FIXED) {

@@ -30,8 +30,9 @@ typedef struct hapi_body_set {
 
 typedef struct hapi_island {
   hapi_solver *solver;
-  bool held;      /* hubs keep the velocity that they have in v */
-  uint32_t first; /* row; the others by hapi_row.next, in their order */
+  bool held;        /* hubs keep the velocity that they have in v */
+  double softening; /* R, relative to a row's own response */
+  uint32_t first;   /* row; the others by hapi_row.next, in their order */
   uint32_t free_rows;
   uint32_t used_rows; /* free or tied */
   uint32_t count;     /* bodies */

@@ -37,7 +37,7 @@
 #define COARSE_REST 1e-12 /* J a body, of a sweep's corrections that stay undone in a tick */
 #define COARSE_MOST 1e-10 /* the most, under a hand */
 #define COARSE_FADE 0.98  /* a tick */
-#define COARSE_LEVELS 8.0 /* of a stack: a higher one leans by the square of its height */
+#define COARSE_LEVELS 4.0 /* of a stack: a higher one leans by the square of its height */
 
 /* A tick whose solves have taken half as many row updates again as is usual, or what is done within
  * 20 us, leaves the rest to the next ticks, where the rest is little. */
