@@ -61,11 +61,13 @@ typedef struct hapi_body_stay {
   uint32_t row;
   bool waiting;
   hap_pose pose;
-  double moved[6]; /* m, rad about world axes, from that pose to the one of this tick */
-  double way;      /* m, sum of the sizes of its linear components */
-  double turn;     /* rad, likewise of the others */
-  double speed;    /* m/s, sum of the components' sizes */
-  double spin;     /* rad/s, likewise */
+  double most_way;  /* m, of each component, before it ends */
+  double most_turn; /* rad, likewise */
+  double moved[6];  /* m, rad about world axes, from that pose to the one of this tick */
+  double way;       /* m, sum of the sizes of its linear components */
+  double turn;      /* rad, likewise of the others */
+  double speed;     /* m/s, sum of the components' sizes */
+  double spin;      /* rad/s, likewise */
   hapi_body_still still;
 } hapi_body_stay;
 
@@ -133,6 +135,7 @@ typedef struct hapi_bodies {
   uint32_t still;          /* that stand still, see body_still.h */
   uint32_t quiet;          /* that may soon, in this tick */
   bool never_still;        /* all are awake: what else must come out the same, for tests */
+  bool exact;              /* stays of all are as short as those of slow ones */
   bool unsound;            /* a state was not finite in this tick */
   double given;            /* J, of this tick: what things of given motion did on owned bodies */
   double owned_impulse[3]; /* since start, see hapi_state */

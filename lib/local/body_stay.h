@@ -9,11 +9,17 @@
 
 #include "local/body.h"
 
-/* So far a body may go, and what was made from its pose follows by its first derivatives. The
- * second ones are below 1e-10 m for arms of a metre, and nothing adds up: the motion counts from
- * the kept pose, not from the tick before. */
-#define HAPI_STAY_WAY 1e-6  /* m, of each component */
-#define HAPI_STAY_TURN 1e-5 /* rad, likewise */
+/* So far a body may go, and gaps of what was made from its pose follow by their first derivatives.
+ * Nothing adds up: the motion counts from the kept pose, not from the tick before. Of a slow body,
+ * which may be about to rest, the second derivatives stay below 1e-10 m for arms of a metre. */
+#define HAPI_STAY_SLOW_WAY 1e-6  /* m, of each component */
+#define HAPI_STAY_SLOW_TURN 1e-5 /* rad, likewise */
+/* Of others they stay below 1e-8 m. Normals and arms are not turned: a thousandth of friction. */
+#define HAPI_STAY_WAY 3e-5
+#define HAPI_STAY_TURN 3e-4  /* at most */
+#define HAPI_STAY_BEND 1e-9  /* m, of arms as long as the body is large */
+#define HAPI_STAY_SPEED 1e-5 /* m/s, sum of the components' sizes: less is slow */
+#define HAPI_STAY_SPIN 1e-4  /* rad/s, likewise */
 
 /* Numbers of stays. Those of bodies are higher. */
 #define HAPI_STAY_UNKNOWN 0u
@@ -41,23 +47,45 @@ static inline double hapi_stay_moved(const hapi_local_body *body, const double j
                       : hapi_v3_dot(j, body->stay.moved) + hapi_v3_dot(j + 3, body->stay.moved + 3);
 }
 
-/* False: too far, or not finite. */
-static inline bool hapi_stay_measure(const hap_pose *from, const hap_pose *to, double out_moved[6])
+/* rad, of each component. The trace of the inertia is twice the mass times the mean square of the
+ * distance from the centre, and that of a matrix is the sum of the principal minors of its inverse
+ * over the determinant. */
+static inline double hapi_stay_turn(const hapi_local_body *body)
 {
-  const double *k = from->quat_wxyz;
+  const double *i = body->inverse_inertia;
+  double minor0 = i[4] * i[8] - i[5] * i[7];
+  double minors = minor0 + i[0] * i[8] - i[2] * i[6] + i[0] * i[4] - i[1] * i[3];
+  double det =
+      i[0] * minor0 - i[1] * (i[3] * i[8] - i[5] * i[6]) + i[2] * (i[3] * i[7] - i[4] * i[6]);
+  double radius2 = 0.5 * body->inverse_mass * minors / det;
+  if (!(det > 0.0) || !(radius2 > 0.0)) {
+    return HAPI_STAY_SLOW_TURN; /* not by its mass, or not placed yet */
+  }
+  double turn = sqrt(2.0 * HAPI_STAY_BEND / sqrt(radius2));
+  return hapi_max(HAPI_STAY_SLOW_TURN, hapi_min(turn, HAPI_STAY_TURN));
+}
+
+/* False: too far, or not finite. */
+static inline bool hapi_stay_measure(const hapi_body_stay *stay, const hap_pose *to,
+                                     double out_moved[6])
+{
+  const double *k = stay->pose.quat_wxyz;
   const double *q = to->quat_wxyz;
-  double turn[3];
+  bool slow = stay->speed < HAPI_STAY_SPEED && stay->spin < HAPI_STAY_SPIN;
+  double axis[3];
   double cosine = k[0] * q[0] + hapi_v3_dot(k + 1, q + 1); /* q and -q are the same */
-  hapi_v3_sub(to->position, from->position, out_moved);
-  hapi_v3_cross(k + 1, q + 1, turn);
-  hapi_v3_madd(turn, k[0], q + 1, turn);
-  hapi_v3_madd(turn, -q[0], k + 1, turn);
-  hapi_v3_scale(2.0 * cosine, turn, out_moved + 3);
+  hapi_v3_sub(to->position, stay->pose.position, out_moved);
+  hapi_v3_cross(k + 1, q + 1, axis);
+  hapi_v3_madd(axis, k[0], q + 1, axis);
+  hapi_v3_madd(axis, -q[0], k + 1, axis);
+  hapi_v3_scale(2.0 * cosine, axis, out_moved + 3);
   double way = hapi_max(fabs(out_moved[0]), hapi_max(fabs(out_moved[1]), fabs(out_moved[2])));
   double angle = hapi_max(fabs(out_moved[3]), hapi_max(fabs(out_moved[4]), fabs(out_moved[5])));
   double sum = out_moved[0] + out_moved[1] + out_moved[2] + out_moved[3] + out_moved[4] +
                out_moved[5]; /* hapi_max loses NaN */
-  return way <= HAPI_STAY_WAY && angle <= HAPI_STAY_TURN && cosine * cosine > 0.5 && sum == sum;
+  return way <= (slow ? HAPI_STAY_SLOW_WAY : stay->most_way) &&
+         angle <= (slow ? HAPI_STAY_SLOW_TURN : stay->most_turn) && cosine * cosine > 0.5 &&
+         sum == sum;
 }
 
 static inline void hapi_stay_sum(hapi_body_stay *io)
@@ -83,7 +111,7 @@ static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
   stay->speed = fabs(v[0]) + fabs(v[1]) + fabs(v[2]);
   stay->spin = fabs(w[0]) + fabs(w[1]) + fabs(w[2]);
   if (stay->number != HAPI_STAY_UNKNOWN && stay->flags == flags && stay->row == body->row &&
-      stay->waiting == body->waiting && hapi_stay_measure(&stay->pose, &body->pose, stay->moved)) {
+      stay->waiting == body->waiting && hapi_stay_measure(stay, &body->pose, stay->moved)) {
     hapi_stay_sum(stay);
     return;
   }
@@ -92,6 +120,8 @@ static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
   stay->row = body->row;
   stay->waiting = body->waiting;
   stay->pose = body->pose;
+  stay->most_way = bodies->exact ? HAPI_STAY_SLOW_WAY : HAPI_STAY_WAY;
+  stay->most_turn = bodies->exact ? HAPI_STAY_SLOW_TURN : hapi_stay_turn(body);
   memset(stay->moved, 0, sizeof stay->moved);
   stay->way = stay->turn = 0.0;
 }

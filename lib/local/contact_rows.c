@@ -346,9 +346,9 @@ void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bo
 
 /* ---- what is kept ---- */
 
-/* m, twice what the gap of a kept contact may be off by (touch_place.c). The gap counts as so much
- * wider. So what rests is never lifted out of the touch that the world's collision sees, and is
- * still held there when the loop gives it back. */
+/* m, twice what the gap of a kept contact may be off by where a body is slow (touch_place.c). The
+ * gap counts as so much wider. So what rests is never lifted out of the touch that the world's
+ * collision sees, and is still held there when the loop gives it back. */
 #define FOLLOW_MARGIN 2e-9
 
 /* m, more than a contact may come nearer while its bodies stay: from one end of their ways to the

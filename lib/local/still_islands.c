@@ -131,8 +131,7 @@ static bool may_stand(hapi_local_body *body, double period)
   const uint32_t others = HAPI_BODY_MEASURED | HAPI_BODY_BRACED | HAPI_BODY_SHARED;
   return hapi_still_is_quiet(body, period) && hapi_body_is_owned(body) &&
          hapi_body_responds(body) && (body->flags & others) == 0 && !body->waiting &&
-         stay->number != HAPI_STAY_UNKNOWN &&
-         hapi_stay_measure(&stay->pose, &body->pose, stay->moved);
+         stay->number != HAPI_STAY_UNKNOWN && hapi_stay_measure(stay, &body->pose, stay->moved);
 }
 
 static uint32_t root_of(const hapi_bodies *bodies, uint32_t slot)

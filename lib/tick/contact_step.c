@@ -103,6 +103,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   solver->apart = true;
   rows->hand = HUGE_VAL;
   bodies->resting = bodies->quiet = 0;
+  bodies->exact = !(rows->drift > 0.0);
   bool stays = patches != NULL && patches->contact_count > 0;
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
