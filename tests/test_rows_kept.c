@@ -34,9 +34,8 @@ static hapi_model_body *box_add(double mass)
 
 /* The four lower corners of the box on the floor, whose face is fixed. The message is written where
  * the one before was, as by a contact thread that has it back. */
-static void contacts_adopt(double mu, uint64_t first_number)
+static void patches_fill(hapi_patches *patches, double mu, uint64_t first_number)
 {
-  hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
   patches->contact_count = 4;
   patches->surface_count = 1;
   patches->tool_count = 0;
@@ -60,6 +59,13 @@ static void contacts_adopt(double mu, uint64_t first_number)
                       .mu2 = mu,
                       .erp = 0.2,
                       .max_push = HUGE_VAL};
+}
+
+static void contacts_adopt(double mu, uint64_t first_number)
+{
+  hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
+  patches->contents = 0;
+  patches_fill(patches, mu, first_number);
   hapi_tick_adopt_patches(&f.tick, patches);
 }
 
@@ -208,6 +214,30 @@ TEST(the_same_contact_with_another_friction_has_rows_anew)
   CHECK(f.rows[0].made != made);
   CHECK_NEAR(f.rows[1].mu, 0.2, 0.0);
   CHECK_NEAR(load_on_floor(), 9.81 * MASS, 1e-6); /* from the impulses that it had */
+}
+
+/* A message that says that its contacts are those of the one before is not read. */
+TEST(the_same_contents_are_not_read)
+{
+  const uint64_t number = 100;
+  box_rest();
+  contacts_adopt(0.5, number);
+  ticks_run(2);
+  double before = f.rows[1].mu;
+  f.tick.contacts.contents = 7;
+  hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
+  patches->contents = 7;
+  patches_fill(patches, 0.5, number);
+  hapi_tick_adopt_patches(&f.tick, patches);
+  CHECK(!f.tick.contacts.adopted && f.tick.contacts.patches == patches);
+  ticks_run(1);
+  CHECK(f.rows[1].mu == before);
+  patches->contents = 8;
+  patches_fill(patches, 0.3, number);
+  hapi_tick_adopt_patches(&f.tick, patches);
+  CHECK(f.tick.contacts.adopted && f.tick.contacts.contents == 8);
+  ticks_run(1);
+  CHECK(f.rows[1].mu == 0.3 && f.tick.contacts.memory[0].number == number);
 }
 
 /* The rows of pointers come first: contacts move up and down the list as a pointer comes and

@@ -96,6 +96,7 @@ void hapi_asking_run(hapi_asking *asking, hapi_near *near, const hapi_tape *tape
   if (!asks) {
     return;
   }
+  io->contents = 0;
   uint32_t kept = 0;
   memcpy(asking->surfaces, hapi_patches_surfaces(io), io->surface_count * sizeof *asking->surfaces);
   memcpy(asking->tags, hapi_patches_pairs(io), io->surface_count * sizeof *asking->tags);

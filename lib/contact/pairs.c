@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "base/alloc.h"
+#include "base/hash.h"
 #include "base/vec.h"
 #include "contact/flat_areas.h"
 #include "contact/kept.h"
@@ -319,6 +320,7 @@ static void patches_add(hapi_pairs *pairs, const hapi_pass_body *const bodies[2]
   hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
   *c = *contact;
   c->surface = out->surface_count;
+  out->contents = hapi_hash_word(out->contents, c->number);
 }
 
 static void patches_add_kept(hapi_pairs *pairs, const hapi_pass_body *const bodies[2],
@@ -374,6 +376,7 @@ static bool keys_fill(hapi_pairs *pairs, hapi_patches *out)
   uint64_t wanted = 0;
   out->contact_count = 0;
   out->surface_count = 0;
+  out->contents = hapi_hash_word(HAPI_HASH_BEGIN, pairs->places->near->model_number);
   for (uint32_t i = 0; i < pairs->kept.count; ++i) {
     key_fill(pairs, i, &wanted, out);
   }

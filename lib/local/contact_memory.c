@@ -72,19 +72,20 @@ static uint64_t surface_hash(const hapi_surface *surface)
 
 /* A contact at the place where it was in the message before keeps its rows as well, if its surface
  * is the same. False: it is another one. */
-static bool memory_goes_on(hapi_contact_memory *old, const hapi_patch_contact *in, uint64_t surface,
-                           hapi_contact_memory *memory)
+static bool memory_goes_on(hapi_contact_memory *memory, const hapi_patch_contact *in,
+                           uint64_t surface, bool *io_changed)
 {
-  if (old->number != in->number || in->number == 0) {
+  if (memory->number != in->number || in->number == 0) {
     return false;
   }
-  *memory = *old;
-  memory->kept.surface = in->surface;
-  if (old->surface != surface) {
+  if (memory->kept.surface != in->surface) {
+    memory->kept.surface = in->surface;
+  }
+  if (memory->surface != surface) {
     memory->surface = surface;
     memory->kept.what = HAPI_KEPT_NOTHING;
+    *io_changed = true;
   }
-  hapi_v3_set(old->core_a, HUGE_VAL, HUGE_VAL, HUGE_VAL);
   return true;
 }
 
@@ -109,35 +110,80 @@ static void memory_match(hapi_body_contacts *contacts, hapi_contact_memory *memo
   }
 }
 
-void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches)
+/* What the same contents stand for. */
+static inline bool contents_are_same(const hapi_body_contacts *contacts, hapi_patches *patches)
 {
-  uint32_t old_count = contacts->patches != NULL ? contacts->memory_count : 0;
-  hapi_contact_memory *old = contacts->memory;
-  bool indexed = false;
-  contacts->memory = contacts->old_memory;
-  contacts->old_memory = old;
-  contacts->patches = patches;
-  contacts->adopted = true;
-  contacts->memory_count = patches->contact_count;
   const hapi_patch_contact *in = hapi_patches_contacts(patches);
-  uint64_t surface = 0;
   for (uint32_t i = 0; i < patches->contact_count; ++i) {
-    hapi_contact_memory *memory = &contacts->memory[i];
-    if (i == 0 || in[i].surface != in[i - 1].surface) {
-      surface = surface_hash(&hapi_patches_surfaces(patches)[in[i].surface]);
+    const hapi_contact_memory *memory = &contacts->memory[i];
+    if (memory->number != in[i].number || memory->kept.surface != in[i].surface ||
+        memory->surface != surface_hash(&hapi_patches_surfaces(patches)[in[i].surface])) {
+      return false;
     }
-    if (i < old_count && memory_goes_on(&old[i], &in[i], surface, memory)) {
-      continue;
-    }
-    if (!indexed) {
-      index_old(contacts, old_count);
-      indexed = true;
-    }
-    memset(memory, 0, sizeof *memory);
-    memory->key = in[i].key;
-    memory->number = in[i].number;
-    memory->surface = surface;
-    hapi_v3_copy(in[i].core_a, memory->core_a);
+  }
+  return true;
+}
+
+static void memory_begin(hapi_body_contacts *contacts, uint32_t i, const hapi_patch_contact *in,
+                         uint64_t surface, uint32_t old_count)
+{
+  hapi_contact_memory *memory = &contacts->memory[i];
+  memset(memory, 0, sizeof *memory);
+  memory->key = in->key;
+  memory->number = in->number;
+  memory->surface = surface;
+  memory->kept.surface = in->surface;
+  hapi_v3_copy(in->core_a, memory->core_a);
+  if (old_count > 0) {
     memory_match(contacts, memory, old_count);
   }
+}
+
+/* What goes on stays where it is and is hardly looked at: most of a thousand contacts do. What ends
+ * is put aside, and what is new looks for its impulses there. */
+void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches)
+{
+  bool same = contacts->patches != NULL && patches->contents != 0 &&
+              patches->contents == contacts->contents &&
+              patches->contact_count == contacts->memory_count;
+  uint32_t before = contacts->patches != NULL ? contacts->memory_count : 0;
+  uint32_t count = patches->contact_count;
+  uint32_t ended = 0;
+  uint32_t first_new = count;
+  bool changed = before != count;
+  const hapi_patch_contact *in = hapi_patches_contacts(patches);
+  const hapi_surface *surfaces = hapi_patches_surfaces(patches);
+  uint64_t surface = 0;
+  contacts->patches = patches;
+  contacts->contents = patches->contents;
+  if (same) {
+    HAPI_ASSERT(contents_are_same(contacts, patches));
+    return;
+  }
+  for (uint32_t i = 0; i < before; ++i) {
+    hapi_contact_memory *memory = &contacts->memory[i];
+    if (i < count && (i == 0 || in[i].surface != in[i - 1].surface)) {
+      surface = surface_hash(&surfaces[in[i].surface]);
+    }
+    if (i >= count || !memory_goes_on(memory, &in[i], surface, &changed)) {
+      contacts->old_memory[ended++] = *memory;
+      memory->number = 0;
+      first_new = i < first_new ? i : first_new;
+    }
+  }
+  first_new = before < first_new ? before : first_new;
+  if (ended > 0) {
+    index_old(contacts, ended);
+  }
+  for (uint32_t i = first_new; i < count; ++i) {
+    if (i == first_new || in[i].surface != in[i - 1].surface) {
+      surface = surface_hash(&surfaces[in[i].surface]);
+    }
+    if (i >= before || contacts->memory[i].number == 0) {
+      memory_begin(contacts, i, &in[i], surface, ended);
+      changed = true;
+    }
+  }
+  contacts->memory_count = count;
+  contacts->adopted |= changed;
 }

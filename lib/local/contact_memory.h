@@ -48,16 +48,17 @@ typedef struct hapi_contact_memory {
 } hapi_contact_memory;
 
 typedef struct hapi_body_contacts {
-  hapi_patches *patches;       /* NULL: none yet */
-  hapi_contact_memory *memory; /* of its contacts; capacity.contacts */
-  hapi_contact_memory *old_memory;
+  hapi_patches *patches;           /* NULL: none yet */
+  hapi_contact_memory *memory;     /* of its contacts; capacity.contacts */
+  hapi_contact_memory *old_memory; /* scratch: of those that have ended */
+  uint64_t contents;               /* of the patches */
   uint32_t memory_count;
   uint32_t *buckets;     /* of the matching; bucket_count */
   uint32_t bucket_count; /* power of 2 */
   uint32_t buckets_used; /* likewise; scratch of the matching */
   uint32_t active;       /* that push in this tick */
   uint32_t still_active; /* likewise, of contacts without rows: their islands are still */
-  bool adopted;          /* since rows were made */
+  bool adopted;          /* since rows were made: contacts came, went or changed their surface */
   uint64_t rowed_tick;   /* the last one in which rows were made */
 } hapi_body_contacts;
 

@@ -101,12 +101,10 @@ static void body_merge(const hapi_merge *merge, const hapi_merge_from *from, uin
   const hapi_state_body *told = guest != NULL ? body_told(guest, slot, share->generation) : NULL;
   bool has = told != NULL && (told->flags & HAPI_BODY_OWNED) != 0;
   memset(out, 0, sizeof *out);
-  if (!has && body_hand_over(from, share, slot, out)) {
-    told = out;
-    guest = NULL;
-  } else if (told == NULL || !(guest->fresh || has)) {
-    return; /* what the loop only pushes is told once */
-  } else {
+  if (has || !body_hand_over(from, share, slot, out)) {
+    if (told == NULL || !(guest->fresh || has)) {
+      return; /* what the loop only pushes is told once */
+    }
     share->before = HAPI_GUEST_NONE;
     *out = *told;
     bool old = told->owned_until_ns <= guest->bodies[slot].until_ns;

@@ -86,6 +86,8 @@ typedef struct hapi_patches {
   uint64_t model_number; /* of the hapi_near that it was made from */
   uint64_t tick;         /* of the hapi_poses */
   int64_t valid_from_ns; /* the loop uses the message from this time on */
+  uint64_t contents;     /* messages with the same have the same contacts, with their numbers and
+                            surfaces, in the same order; 0: not known */
   uint32_t contact_count;
   uint32_t surface_count;
   uint32_t tool_count; /* of pointers that are hulls; those of a key follow each other */
