@@ -15,6 +15,12 @@ static void report_bodies(const hapi_bodies *from, hapi_state *out)
   hapi_state_body *bodies = hapi_state_bodies(out);
   for (uint32_t i = 0; i < from->high; ++i) {
     const hapi_local_body *in = &from->of[i];
+    if (in->generation == 0) { /* never adopted: nothing is written where nothing was */
+      if (bodies[i].generation != 0) {
+        memset(&bodies[i], 0, sizeof bodies[i]);
+      }
+      continue;
+    }
     bodies[i].generation = in->generation;
     bodies[i].flags = in->flags;
     bodies[i].epoch = in->epoch;
