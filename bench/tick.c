@@ -105,6 +105,9 @@ static void tick_restore(hapi_tick *tick, const tick_state *saved)
     memcpy(saved->arrays[i].at, saved->bytes + used, saved->arrays[i].bytes);
     used += saved->arrays[i].bytes;
   }
+  /* Its arrays are those of the tick that was measured: with the counts of the one before, sweeps
+   * went beyond their ends. */
+  hapi_packs_forget(&tick->rows.solver.packs);
 }
 
 /* The tick of model CONTACT, which carries the contacts between the bodies itself: cubes that touch
