@@ -156,9 +156,52 @@ TEST(gaps_follow_bodies_that_tilt_and_creep)
 TEST(a_body_that_goes_far_in_a_tick_is_placed_in_each)
 {
   static const double twist[6] = {0.0, 0.0, 1e-3, 0.0, 0.02, 0.0};
+  static const double fast[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.31};
   follow_result r = gap_follow(twist, 0.0, 100);
   CHECK(r.kept == 0);
   CHECK(r.error < 1e-15 && r.least > -1e-15);
+  r = gap_follow(fast, 0.03, 100);
+  CHECK(r.kept == 0);
+  CHECK(r.error < 1e-15 && r.least > -1e-15);
+}
+
+/* What is slow, and may come to rest, keeps to the short way. */
+TEST(a_slow_body_is_placed_as_often_as_at_accuracy_1)
+{
+  static const double slow[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.9 * HAPI_STAY_SPIN};
+  static const double not_slow[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 1.1 * HAPI_STAY_SPIN};
+  follow_result r = gap_follow(slow, 0.03, 1000);
+  follow_result exact = gap_follow(slow, 0.0, 1000);
+  CHECK_SAY(r.anew == exact.anew && r.anew > 8, "%d and %d", r.anew, exact.anew);
+  r = gap_follow(not_slow, 0.03, 1000);
+  CHECK_SAY(r.anew == 1, "%d", r.anew); /* the first tick */
+}
+
+/* A box of edges a, b, c: the mean square of the distance from its centre is (a^2 + b^2 + c^2) / 12,
+ * however it has turned. */
+TEST(large_bodies_turn_less_before_they_are_placed_anew)
+{
+  static const double edges[][3] = {{0.03, 0.05, 0.2}, {0.4, 1.0, 3.0}, {20.0, 30.0, 60.0}};
+  const double q[4] = {0.5, -0.1, 0.7, 0.5};
+  for (size_t i = 0; i < sizeof edges / sizeof edges[0]; ++i) {
+    const double *e = edges[i];
+    double axes[9];
+    hapi_local_body body = {.inverse_mass = 1.0 / 7.0};
+    hapi_quat_to_matrix(q, axes);
+    for (int k = 0; k < 9; ++k) {
+      for (int n = 0; n < 3; ++n) {
+        double along =
+            7.0 / 12.0 * (e[(n + 1) % 3] * e[(n + 1) % 3] + e[(n + 2) % 3] * e[(n + 2) % 3]);
+        body.inverse_inertia[k] += axes[3 * (k / 3) + n] * axes[3 * (k % 3) + n] / along;
+      }
+    }
+    double radius = sqrt((e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) / 12.0);
+    double turn = sqrt(2.0 * HAPI_STAY_BEND / radius);
+    turn = fmax(HAPI_STAY_SLOW_TURN, fmin(turn, HAPI_STAY_TURN));
+    CHECK_NEAR(hapi_stay_turn(&body), turn, 1e-9 * turn);
+  }
+  hapi_local_body none = {.inverse_mass = 0.0};
+  CHECK(hapi_stay_turn(&none) == HAPI_STAY_SLOW_TURN);
 }
 
 /* At rest on the floor, pressed by its weight. */
@@ -214,30 +257,6 @@ TEST(the_same_contact_with_another_friction_has_rows_anew)
   CHECK(f.rows[0].made != made);
   CHECK_NEAR(f.rows[1].mu, 0.2, 0.0);
   CHECK_NEAR(load_on_floor(), 9.81 * MASS, 1e-6); /* from the impulses that it had */
-}
-
-/* A message that says that its contacts are those of the one before is not read. */
-TEST(the_same_contents_are_not_read)
-{
-  const uint64_t number = 100;
-  box_rest();
-  contacts_adopt(0.5, number);
-  ticks_run(2);
-  double before = f.rows[1].mu;
-  f.tick.contacts.contents = 7;
-  hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
-  patches->contents = 7;
-  patches_fill(patches, 0.5, number);
-  hapi_tick_adopt_patches(&f.tick, patches);
-  CHECK(!f.tick.contacts.adopted && f.tick.contacts.patches == patches);
-  ticks_run(1);
-  CHECK(f.rows[1].mu == before);
-  patches->contents = 8;
-  patches_fill(patches, 0.3, number);
-  hapi_tick_adopt_patches(&f.tick, patches);
-  CHECK(f.tick.contacts.adopted && f.tick.contacts.contents == 8);
-  ticks_run(1);
-  CHECK(f.rows[1].mu == 0.3 && f.tick.contacts.memory[0].number == number);
 }
 
 /* The rows of pointers come first: contacts move up and down the list as a pointer comes and

@@ -196,6 +196,76 @@ TEST(a_joint_wakes_the_stack_of_its_body)
             w->position[2 * HIGH - 1][1] - before);
 }
 
+/* ---- sets of contacts ---- */
+
+#define SET_MOST 200
+
+/* What a set has, read by itself. */
+typedef struct contact_set {
+  uint64_t contents;
+  uint32_t count;
+  uint64_t number[SET_MOST];
+  double mu[SET_MOST];
+} contact_set;
+
+static void set_read(const contact_world *w, contact_set *out)
+{
+  hapi_patches *patches = w->session->haptic->tick.contacts.patches;
+  memset(out, 0, sizeof *out);
+  out->contents = patches->contents;
+  out->count = patches->contact_count;
+  REQUIRE(out->count <= SET_MOST);
+  for (uint32_t i = 0; i < out->count; ++i) {
+    const hapi_patch_contact *c = &hapi_patches_contacts(patches)[i];
+    out->number[i] = c->number;
+    out->mu[i] = hapi_patches_surfaces(patches)[c->surface].mu;
+  }
+}
+
+static bool set_equals(const contact_set *a, const contact_set *b)
+{
+  return a->count == b->count && memcmp(a->number, b->number, sizeof a->number) == 0 &&
+         memcmp(a->mu, b->mu, sizeof a->mu) == 0;
+}
+
+/* Sets that say that they are the same have the same contacts, and most do where all is at rest.
+ * Each 0.1 s the friction changes. */
+TEST(sets_that_say_that_they_are_the_same_are)
+{
+  contact_world *w = world_rest();
+  contact_set before;
+  int same[2] = {0, 0};
+  int others[2] = {0, 0};
+  set_read(w, &before);
+  for (int i = 0; i < 1200; ++i) {
+    contact_set now;
+    uint64_t seen = w->session->haptic->tick.contacts.patches->number;
+    bool pushed = i >= 600;
+    if (i == 600) {
+      w->hand_velocity[0] = 0.05;
+    }
+    if (i < 600 && i % 100 == 0) {
+      w->surface.mu = 0.5 + 1e-3 * i;
+    }
+    cw_tick(w);
+    if (w->session->haptic->tick.contacts.patches->number == seen) {
+      continue;
+    }
+    set_read(w, &now);
+    CHECK(now.contents != 0);
+    if (now.contents == before.contents) {
+      CHECK(set_equals(&now, &before));
+      CHECK(pushed || !w->session->haptic->tick.contacts.adopted);
+    }
+    same[pushed] += now.contents == before.contents;
+    others[pushed] += !set_equals(&now, &before);
+    before = now;
+  }
+  printf("# at rest %d the same, %d others; pushed %d and %d\n", same[0], others[0], same[1],
+         others[1]);
+  CHECK(same[0] > 60 && others[0] >= 4 && others[1] > 20);
+}
+
 /* ---- what packs know of bodies ---- */
 
 /* R I^-1 R^T of the pose with which the tick begins; R worked out here from the quaternion. */
