@@ -177,8 +177,8 @@ TEST(a_slow_body_is_placed_as_often_as_at_accuracy_1)
   CHECK_SAY(r.anew == 1, "%d", r.anew); /* the first tick */
 }
 
-/* A box of edges a, b, c: the mean square of the distance from its centre is (a^2 + b^2 + c^2) / 12,
- * however it has turned. */
+/* A box of edges a, b, c: the mean square of the distance from its centre is
+ * (a^2 + b^2 + c^2) / 12, however it has turned. */
 TEST(large_bodies_turn_less_before_they_are_placed_anew)
 {
   static const double edges[][3] = {{0.03, 0.05, 0.2}, {0.4, 1.0, 3.0}, {20.0, 30.0, 60.0}};
