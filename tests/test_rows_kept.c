@@ -153,6 +153,70 @@ TEST(gaps_follow_bodies_that_tilt_and_creep)
   }
 }
 
+/* ---- an edge that slides on the border of a face ---- */
+
+#define BORDER_WAY 0.002 /* m, from the corner of the box to the border, along x */
+
+/* One contact: where the edge of the box that rises from its first corner along x is over the
+ * border of the floor, which ends there. */
+static void edge_adopt(const double edge[3])
+{
+  hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
+  patches->contents = 0;
+  patches_fill(patches, 0.5, 0);
+  patches->contact_count = 1;
+  hapi_patch_contact *c = &hapi_patches_contacts(patches)[0];
+  c->slide = HAPI_SLIDE_EDGE;
+  hapi_v3_copy(edge, c->edge_a);
+  hapi_v3_set(c->edge_b, 1.0, 0.0, 0.0);
+  hapi_v3_set(c->core_b, c->core_a[0] + BORDER_WAY, c->core_a[1], 0.0);
+  hapi_tick_adopt_patches(&f.tick, patches);
+}
+
+/* m, of the edge over the floor where it crosses the border: a line and a plane. */
+static double edge_height(const hap_pose *pose, const double edge[3])
+{
+  double point[3];
+  double along[3];
+  double first[3] = {-corner[0], -corner[1], corner[2]};
+  hapi_quat_rotate(pose->quat_wxyz, first, point);
+  hapi_quat_rotate(pose->quat_wxyz, edge, along);
+  hapi_v3_add(point, pose->position, point);
+  return point[2] + along[2] / along[0] * (first[0] + BORDER_WAY - point[0]);
+}
+
+/* Without the slope the gap would be off by a tenth of the way that rows are kept for: 3 um. */
+TEST(gaps_follow_an_edge_that_slides_over_a_border)
+{
+  static const double twists[][6] = {{1e-3, 0.0, 0.0, 0.0, 0.0, 0.0},
+                                     {-7e-4, 3e-4, 1e-5, 1e-3, 0.0, 2e-3},
+                                     {5e-4, 0.0, 0.0, -2e-3, 3e-3, 5e-3}};
+  static const double slopes[] = {0.15, -0.1, 1e-3};
+  for (size_t i = 0; i < sizeof twists / sizeof twists[0]; ++i) {
+    double edge[3] = {cos(slopes[i]), 0.0, sin(slopes[i])};
+    double was[6] = {0.0};
+    double error = 0.0;
+    int kept = 0;
+    set_up();
+    f.tick.hashing = false;
+    hapi_model_body *body = box_add(MASS);
+    memcpy(&body->twist, twists[i], sizeof body->twist);
+    f.model->force_drift = 0.03;
+    model_adopt();
+    edge_adopt(edge);
+    for (int k = 0; k < 500; ++k) {
+      const hap_pose before = f.bodies[0].pose;
+      ticks_run(1);
+      REQUIRE(f.tick.rows.solver.row_count == 3);
+      error = fmax(error, fabs(-T * f.rows[0].target - edge_height(&before, edge)));
+      kept += memcmp(was, f.rows[0].ja, sizeof was) == 0;
+      memcpy(was, f.rows[0].ja, sizeof was);
+    }
+    CHECK_SAY(error < 2e-8, "%zu: %g m", i, error);
+    CHECK_SAY(kept > 400 && kept < 499, "%zu: %d", i, kept);
+  }
+}
+
 TEST(a_body_that_goes_far_in_a_tick_is_placed_in_each)
 {
   static const double twist[6] = {0.0, 0.0, 1e-3, 0.0, 0.02, 0.0};

@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/hash.h"
 #include "base/vec.h"
+#include "contact/rule.h"
 
 #define NONE HAPI_SLOT_NONE
 
@@ -289,4 +290,70 @@ void hapi_kept_find(hapi_kept *kept, hapi_kept_pair *pair, const hapi_pass_body 
   pair->gap = HUGE_VAL;
   pair->by_world = false;
   pair->valid = true;
+}
+
+/* ---- what is found again ---- */
+
+#define AGAIN_SHARE 0.5 /* of pair_way: crossing edges meet elsewhere on themselves */
+#define AGAIN_MOST 64u  /* contacts of a pair: of more all are new */
+
+/* What has ended leaves its place to the next new one: what comes after it stays where it is. */
+static void order_fill(const hapi_patch_contact *in, uint32_t count, uint32_t places,
+                       uint32_t *io_order)
+{
+  uint32_t next = 0;
+  uint32_t used = 0;
+  for (uint32_t i = 0; i < places || used < count; ++i) {
+    uint32_t index = i < places ? io_order[i] : NONE;
+    while (index == NONE && next < count && in[next].number != 0) {
+      ++next;
+    }
+    index = index == NONE && next < count ? next++ : index;
+    if (index != NONE) {
+      io_order[used++] = index;
+    }
+  }
+}
+
+/* m, of crossing edges, see pair_way: the static world has an extent of 0. */
+static double again_way(const hapi_kept_pair *pair)
+{
+  const double *e = pair->extents;
+  double extent = e[1] <= 0.0 || (e[0] > 0.0 && e[0] <= e[1]) ? e[0] : e[1];
+  return AGAIN_SHARE * hapi_min(HAPI_KEPT_SHARE * extent, HAPI_KEPT_WAY);
+}
+
+void hapi_kept_go_on(const hapi_kept *kept, const hapi_kept_pair *pair, hapi_patch_contact *io,
+                     uint32_t count, uint32_t *out_order)
+{
+  uint32_t order[2 * AGAIN_MOST];
+  uint32_t places = 0;
+  double way = again_way(pair);
+  for (uint32_t i = 0; i < count; ++i) {
+    io[i].number = 0;
+    out_order[i] = i;
+  }
+  if (!pair->valid || pair->count > AGAIN_MOST || count > AGAIN_MOST) {
+    return;
+  }
+  for (uint32_t old = pair->contacts; old != NONE; old = kept->next[old]) {
+    uint32_t found = 0;
+    while (found < count &&
+           (io[found].number != 0 || !hapi_rule_is_same(&kept->contacts[old], &io[found], way))) {
+      ++found;
+    }
+    order[places++] = found < count ? found : NONE;
+    if (found < count) {
+      io[found] = kept->contacts[old];
+    }
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    for (uint32_t k = 0; io[i].number == 0 && k < count; ++k) {
+      if (io[k].number != 0 && hapi_rule_is_of_face(&io[k], &io[i])) {
+        hapi_v3_copy(io[k].normal, io[i].normal); /* to the last bit: see packs.h */
+      }
+    }
+  }
+  order_fill(io, count, places, order);
+  memcpy(out_order, order, count * sizeof *order);
 }

@@ -85,6 +85,11 @@ void hapi_kept_take_near(hapi_kept *kept, const hapi_places *places);
 bool hapi_kept_holds(hapi_kept_pair *pair, const hapi_pass_body *a, const hapi_pass_body *b,
                      double margin);
 
+/* Of contacts that were just found anew, in `io`: those that are one that is kept become that one,
+ * with its number; others have number 0. out_order: their indices, each kept one in its place. */
+void hapi_kept_go_on(const hapi_kept *kept, const hapi_kept_pair *pair, hapi_patch_contact *io,
+                     uint32_t count, uint32_t *out_order);
+
 /* Begins anew with no contacts. */
 void hapi_kept_find(hapi_kept *kept, hapi_kept_pair *pair, const hapi_pass_body *a,
                     const hapi_pass_body *b, double margin);

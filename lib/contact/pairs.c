@@ -25,6 +25,7 @@ typedef struct pair_group {
   hapi_flat_areas flat;
   hapi_patch_contact contacts[HAPI_FLAT_POINTS];
   hapi_kept_ends ends[HAPI_FLAT_POINTS]; /* where somebody is asked about them */
+  uint32_t order[HAPI_FLAT_POINTS];      /* in which they go into the message */
   uint32_t count;
   double gap;    /* m, of the deepest; infinite: none */
   double margin; /* m, within which all were looked for */
@@ -290,12 +291,14 @@ static void key_find(hapi_pairs *pairs, const hapi_pass_body *const bodies[2], h
   } else {
     single_find(pairs, near);
   }
+  hapi_kept_go_on(&pairs->kept, io, group->contacts, group->count, group->order);
   hapi_kept_find(&pairs->kept, io, bodies[0], bodies[1], group->margin);
   io->gap = group->gap;
   io->clear = group->clear;
   for (uint32_t i = 0; i < group->count; ++i) {
-    group->contacts[i].number = ++pairs->numbers;
-    hapi_kept_add(&pairs->kept, io, &group->contacts[i], &group->ends[i]);
+    hapi_patch_contact *contact = &group->contacts[group->order[i]];
+    contact->number = contact->number != 0 ? contact->number : ++pairs->numbers;
+    hapi_kept_add(&pairs->kept, io, contact, &group->ends[group->order[i]]);
   }
 }
 
@@ -335,8 +338,10 @@ static void patches_add_kept(hapi_pairs *pairs, const hapi_pass_body *const bodi
 static void patches_add_found(hapi_pairs *pairs, const hapi_pass_body *const bodies[2],
                               hapi_patches *out)
 {
-  for (uint32_t i = 0; i < pairs->group->count; ++i) {
-    patches_add(pairs, bodies, &pairs->group->contacts[i], &pairs->group->ends[i], out);
+  const pair_group *group = pairs->group;
+  for (uint32_t i = 0; i < group->count; ++i) {
+    uint32_t at = group->order[i];
+    patches_add(pairs, bodies, &group->contacts[at], &group->ends[at], out);
   }
 }
 

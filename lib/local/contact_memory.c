@@ -139,6 +139,20 @@ static void memory_begin(hapi_body_contacts *contacts, uint32_t i, const hapi_pa
   }
 }
 
+/* The rows of its pair are made together: of the same directions to the last bit, they stand one
+ * below the other in a pack. */
+static void pair_begin(const hapi_body_contacts *contacts, const hapi_patch_contact *in,
+                       uint32_t index, uint32_t count)
+{
+  uint32_t begin = index;
+  while (begin > 0 && in[begin - 1].key == in[index].key) {
+    --begin;
+  }
+  for (uint32_t i = begin; i < count && in[i].key == in[index].key; ++i) {
+    contacts->memory[i].kept.what = HAPI_KEPT_NOTHING;
+  }
+}
+
 /* What goes on stays where it is and is hardly looked at: most of a thousand contacts do. What ends
  * is put aside, and what is new looks for its impulses there. */
 void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches)
@@ -181,6 +195,7 @@ void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patche
     }
     if (i >= before || contacts->memory[i].number == 0) {
       memory_begin(contacts, i, &in[i], surface, ended);
+      pair_begin(contacts, in, i, count);
       changed = true;
     }
   }

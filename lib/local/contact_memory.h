@@ -23,6 +23,7 @@ typedef struct hapi_contact_kept {
   double gap;     /* m, at the poses where the stays began; APART: the least while they last */
   double reach_a; /* m, by which the body's turn moves the contact, or more */
   double reach_b;
+  double slope[2]; /* ROWS: hapi_touch_spot's along the directions of the frictions */
   double least;    /* ROWS: m, this */
   uint32_t body_a; /* slots */
   uint32_t body_b;
@@ -32,6 +33,7 @@ typedef struct hapi_contact_kept {
   bool plain;   /* ROWS: their targets are those of a contact that touches, no deeper than the next:
                    they ask for no more while the gap is between 0 and */
   bool by_mass; /* ROWS: see hapi_contact_ready */
+  bool slides;  /* ROWS: slope is not 0 */
   bool all;     /* ROWS: one for each part that the surface has, whether the bodies touch or not */
   uint8_t what; /* HAPI_KEPT_ */
 } hapi_contact_kept;

@@ -36,7 +36,8 @@ typedef struct placed_contact {
   double normal[3]; /* from b to a */
   double point[3];  /* between the surfaces */
   double gap;
-  bool follows; /* see hapi_touch_spot */
+  double slope[3];
+  bool follows; /* this and slope: see hapi_touch_spot */
   bool gives;   /* see hapi_row_source */
 } placed_contact;
 
@@ -57,6 +58,7 @@ static bool contact_place(placed_contact *c)
   hapi_v3_copy(spot.normal, c->normal);
   hapi_v3_copy(spot.point, c->point);
   c->gap = spot.gap;
+  hapi_v3_copy(spot.slope, c->slope);
   c->follows = spot.follows;
   return true;
 }
@@ -351,11 +353,15 @@ void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bo
  * collision sees, and is still held there when the loop gives it back. */
 #define FOLLOW_MARGIN 2e-9
 
+/* Less of a slope is left out: over the way of body_stay.h it is 2e-8 m, and 5e-10 where that is
+ * short. */
+#define SLOPE_LEAST 5e-4
+
 /* m, more than a contact may come nearer while its bodies stay: from one end of their ways to the
  * other. */
 static double most_closing(const hapi_contact_kept *kept)
 {
-  return 8.0 * HAPI_STAY_WAY + 4.0 * HAPI_STAY_TURN * (kept->reach_a + kept->reach_b);
+  return 10.0 * HAPI_STAY_WAY + 5.0 * HAPI_STAY_TURN * (kept->reach_a + kept->reach_b);
 }
 
 static double reach_of(const hapi_local_body *body, const double point[3])
@@ -366,6 +372,29 @@ static double reach_of(const hapi_local_body *body, const double point[3])
   }
   hapi_body_arm(body, point, arm);
   return fabs(arm[0]) + fabs(arm[1]) + fabs(arm[2]);
+}
+
+/* m: how much wider the gap of kept rows has become since the stays of the bodies began. */
+static double gap_grown(const hapi_contact_kept *kept, const hapi_row *rows,
+                        const hapi_local_body *a, const hapi_local_body *b)
+{
+  double grown = hapi_stay_moved(a, rows[0].ja) + hapi_stay_moved(b, rows[0].jb);
+  for (int i = 0; kept->slides && i < 2; ++i) {
+    grown +=
+        kept->slope[i] * (hapi_stay_moved(a, rows[1 + i].ja) + hapi_stay_moved(b, rows[1 + i].jb));
+  }
+  return grown;
+}
+
+/* False: the directions of the frictions are not there. */
+static bool keep_slope(const placed_contact *c, const hapi_row *rows, hapi_contact_kept *out)
+{
+  out->slides = hapi_v3_dot(c->slope, c->slope) > SLOPE_LEAST * SLOPE_LEAST;
+  for (int i = 0; out->slides && out->count == 3 && i < 2; ++i) {
+    out->slope[i] = c->a != NULL ? hapi_v3_dot(c->slope, rows[1 + i].ja)
+                                 : -hapi_v3_dot(c->slope, rows[1 + i].jb);
+  }
+  return !out->slides || out->count == 3;
 }
 
 /* For the next tick. first: of its rows, if it has some. */
@@ -396,8 +425,8 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
     for (uint32_t i = 0; i < out->count; ++i) {
       out->what = normal[i].inverse != 0.0 ? out->what : HAPI_KEPT_NOTHING;
     }
-    out->gap = FOLLOW_MARGIN + c->gap - hapi_stay_moved(c->a, normal->ja) -
-               hapi_stay_moved(c->b, normal->jb);
+    out->what = keep_slope(c, normal, out) ? out->what : HAPI_KEPT_NOTHING;
+    out->gap = FOLLOW_MARGIN + c->gap - gap_grown(out, normal, c->a, c->b);
   }
 }
 
@@ -442,6 +471,7 @@ static bool rows_stay(const hapi_rows *rows, const placed_contact *c,
   const hapi_contact_kept *kept = &memory->kept;
   double sum = memory->impulse[0] + memory->impulse[1] + memory->impulse[2];
   double most = hapi_stay_most(c->a, kept->reach_a) + hapi_stay_most(c->b, kept->reach_b);
+  most *= kept->slides ? 1.0 + fabs(kept->slope[0]) + fabs(kept->slope[1]) : 1.0;
   most += GAP_ROUNDING;
   return kept->plain && kept->first == rows->solver.row_count && rows_stand(rows, kept, c->index) &&
          kept->gap + most <= 0.0 && kept->gap - most >= kept->least && hapi_finite(&sum, 1);
@@ -452,8 +482,7 @@ static bool rows_ask_alike(const hapi_rows *rows, const placed_contact *c,
                            const hapi_contact_memory *memory)
 {
   const hapi_row *normal = &rows->solver.rows[memory->kept.first];
-  double gap =
-      memory->kept.gap + hapi_stay_moved(c->a, normal->ja) + hapi_stay_moved(c->b, normal->jb);
+  double gap = memory->kept.gap + gap_grown(&memory->kept, normal, c->a, c->b);
   bool same = normal->impulse == memory->impulse[0] && normal[1].impulse == memory->impulse[1] &&
               normal[2].impulse == memory->impulse[2];
   return same && gap <= 0.0 && -gap - c->surface->layer - PUSH_OUT_SLOP <= 0.0 &&
@@ -477,6 +506,10 @@ static void rows_note_plain(const hapi_row *normal, const placed_contact *c,
     out->by_mass = normal->triple == HAPI_TRIPLE_BY_MASS;
     out->reach_a = turn_of(normal->ja);
     out->reach_b = normal->single ? 0.0 : turn_of(normal->jb);
+    for (int i = 1; out->slides && i < 3; ++i) {
+      out->reach_a = hapi_max(turn_of(normal[i].ja), out->reach_a);
+      out->reach_b = hapi_max(normal->single ? 0.0 : turn_of(normal[i].jb), out->reach_b);
+    }
   }
 }
 
@@ -494,7 +527,7 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
     return false;
   }
   HAPI_ASSERT(kept->first + count <= rows->capacity);
-  c->gap = kept->gap + hapi_stay_moved(c->a, was->ja) + hapi_stay_moved(c->b, was->jb);
+  c->gap = kept->gap + gap_grown(kept, was, c->a, c->b);
   if (c->gap > OPEN_FLOOR || (!kept->all && list_parts(c, memory, parts) != count)) {
     return false;
   }

@@ -99,7 +99,7 @@ static void tool_place(hapi_local_tool *tool, hapi_local_contact *c, const hapi_
   tool->depth = -HUGE_VAL;
   if (tool->placed) {
     hapi_v3_copy(spot.normal, c->normal_now);
-    hapi_v3_copy(spot.point, c->point_now);
+    hapi_v3_copy(spot.of_a, c->point_now); /* what goes with the hull has a share that stays */
     tool->depth = -spot.gap;
   }
 }

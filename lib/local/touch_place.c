@@ -63,40 +63,48 @@ static inline void surface_point(const side *s, const double direction[3], doubl
 
 #define SLIDE_MAX 0.1 /* m between two passes */
 
-/* Limits of hapi_touch_spot.follows: over the way and the turn of body_stay.h the gap is off by no
- * more than 1e-9 m, for arms of 0.1 m. */
+/* Limits of hapi_touch_spot.follows: what is left out is of second order over the way and the turn
+ * of body_stay.h. */
 #define FOLLOW_ASIDE 5e-5 /* m across the normal between the two points */
-#define FOLLOW_SLOPE 5e-4 /* of what slides against the face */
+#define FOLLOW_SLOPE 0.2  /* of what slides against the face */
 #define FOLLOW_ACROSS 0.1 /* sine of the angle between crossing edges */
 
 /* The point of the pushed body goes on to where the border of the face is now. */
 static void point_slide(const touch *c, double a[3], double b[3])
 {
+  if (c->in->slide == HAPI_SLIDE_NONE) {
+    return;
+  }
   bool face_is_a = c->in->touch == HAPI_TOUCH_FACE_A;
+  const double *normal = c->out->normal;
   double *fixed = face_is_a ? a : b;
   double *pushed = face_is_a ? b : a;
+  double *slope = c->out->slope;
   double edge[3];
-  double border[3];
   double apart[3];
+  double way = 0.0;
   hapi_v3_sub(fixed, pushed, apart);
+  frame_vector(face_is_a ? c->b : c->a, face_is_a ? c->in->edge_b : c->in->edge_a, edge);
   if (c->in->slide == HAPI_SLIDE_EDGE) {
-    frame_vector(face_is_a ? c->b : c->a, face_is_a ? c->in->edge_b : c->in->edge_a, edge);
+    double border[3];
     frame_vector(face_is_a ? c->a : c->b, face_is_a ? c->in->edge_a : c->in->edge_b, border);
-    double way = hapi_v3_dot(apart, border) / hapi_v3_dot(edge, border);
+    double across = hapi_v3_dot(edge, border);
+    way = hapi_v3_dot(apart, border) / across;
+    hapi_v3_scale(-hapi_v3_dot(normal, edge) / across, border, slope);
     if (fabs(way) < SLIDE_MAX) { /* false for edges that have become parallel */
       hapi_v3_madd(pushed, way, edge, pushed);
     }
-    double slope = fabs(hapi_v3_dot(edge, c->out->normal));
-    c->out->follows &= slope <= FOLLOW_SLOPE * fabs(hapi_v3_dot(edge, border));
-  } else if (c->in->slide == HAPI_SLIDE_CORNER) {
-    frame_vector(face_is_a ? c->b : c->a, face_is_a ? c->in->edge_b : c->in->edge_a, edge);
-    double up = -hapi_v3_dot(apart, edge) / hapi_v3_dot(c->out->normal, edge);
-    if (fabs(up) < SLIDE_MAX) {
-      hapi_v3_madd(fixed, up, c->out->normal, pushed);
+  } else {
+    double across = hapi_v3_dot(normal, edge);
+    way = -hapi_v3_dot(apart, edge) / across;
+    hapi_v3_scale(1.0 / across, edge, slope);
+    hapi_v3_sub(slope, normal, slope);
+    if (fabs(way) < SLIDE_MAX) {
+      hapi_v3_madd(fixed, way, normal, pushed);
     }
-    double along = hapi_v3_dot(c->out->normal, edge);
-    c->out->follows &= 1.0 - along * along <= FOLLOW_SLOPE * FOLLOW_SLOPE;
   }
+  c->out->follows &=
+      fabs(way) < SLIDE_MAX && hapi_v3_dot(slope, slope) <= FOLLOW_SLOPE * FOLLOW_SLOPE;
 }
 
 static void place_surfaces(const touch *c)
@@ -114,10 +122,15 @@ static void place_surfaces(const touch *c)
   point_slide(c, a, b);
   hapi_v3_sub(a, b, apart);
   c->out->gap = hapi_v3_dot(c->out->normal, apart);
-  hapi_v3_madd(a, -0.5 * c->out->gap, c->out->normal, c->out->point);
   double aside2 = hapi_v3_dot(apart, apart) - c->out->gap * c->out->gap;
   c->out->follows &= !(in->rim_a > 0.0) && !(in->rim_b > 0.0) &&
-                     (in->touch == HAPI_TOUCH_FACE_B || aside2 <= FOLLOW_ASIDE * FOLLOW_ASIDE);
+                     (in->touch != HAPI_TOUCH_EDGES || aside2 <= FOLLOW_ASIDE * FOLLOW_ASIDE);
+  hapi_v3_madd(a, -0.5 * c->out->gap, c->out->normal, c->out->of_a);
+  if (in->touch == HAPI_TOUCH_FACE_A) { /* of a face, any point stands for its plane */
+    hapi_v3_madd(b, 0.5 * c->out->gap, c->out->normal, c->out->point);
+  } else {
+    hapi_v3_copy(c->out->of_a, c->out->point);
+  }
 }
 
 /* Crossing edges: the normal turns with both. Edges that have become parallel keep the last one. */
@@ -154,6 +167,7 @@ static bool place_ball(const touch *c)
   hapi_v3_scale(ball_is_a ? 1.0 : -1.0, nearest.normal, c->out->normal);
   c->out->gap = nearest.distance;
   hapi_v3_madd(nearest.point_a, -0.5 * nearest.distance, nearest.normal, c->out->point);
+  hapi_v3_copy(c->out->point, c->out->of_a);
   return true;
 }
 
@@ -164,6 +178,7 @@ bool hapi_touch_place(const hapi_patch_contact *in, const hapi_touch_frame *a,
   const touch at = {in, a, b, out};
   const touch *c = &at;
   out->follows = true;
+  hapi_v3_set(out->slope, 0.0, 0.0, 0.0);
   switch (c->in->touch) {
     case HAPI_TOUCH_FACE_A:
       frame_vector(c->a, c->in->normal, c->out->normal);

@@ -19,9 +19,11 @@ typedef struct hapi_touch_frame {
 typedef struct hapi_touch_spot {
   double normal[3]; /* world, unit, from b to a */
   double point[3];  /* world, between the surfaces */
+  double of_a[3];   /* the same, but on a face of a it stays with a while b slides there */
   double gap;       /* m */
-  bool follows;     /* while the bodies go a little way, the gap goes as the two bodies there move
-                   along the normal, and the spot goes with them */
+  double slope[3];  /* of the gap: it grows as a goes from b along the normal and this, which is
+                       across: where the spot slides along what is tilted; not of a ball */
+  bool follows;     /* so it does while the bodies go a little way, and the spot goes with them */
 } hapi_touch_spot;
 
 /* False: there is no answer (a ball against a hull). */
