@@ -233,6 +233,69 @@ TEST(impulses_are_what_the_rows_ask_for)
   }
 }
 
+/* J, beyond what the targets ask for, and the largest difference of v from what the impulses make,
+ * m/s. */
+static double energy_beyond(const problem *p, double *out_apart)
+{
+  static double v[BODIES][6];
+  double energy = 0.0;
+  memcpy(v, p->free_v, sizeof v);
+  *out_apart = 0.0;
+  for (uint32_t i = 0; i < p->solver.row_count; ++i) {
+    const hapi_row *row = &p->rows[i];
+    for (int k = 0; k < 6; ++k) {
+      v[row->a][k] += row->impulse * row->ba[k];
+      v[row->b][k] += row->impulse * row->bb[k];
+    }
+  }
+  for (uint32_t i = 0; i < p->solver.row_count; ++i) {
+    const hapi_row *row = &p->rows[i];
+    double before =
+        vector_dot(row->ja, p->free_v[row->a], 6) + vector_dot(row->jb, p->free_v[row->b], 6);
+    double after = vector_dot(row->ja, v[row->a], 6) + vector_dot(row->jb, v[row->b], 6);
+    double mean = 0.5 * (before + after + row->softness * row->impulse);
+    energy += row->impulse * (mean - row->target);
+  }
+  for (uint32_t i = 0; i < BODIES; ++i) {
+    for (int k = 0; k < 6; ++k) {
+      *out_apart = fmax(*out_apart, fabs(v[i][k] - p->v[i][k]));
+    }
+  }
+  return energy;
+}
+
+/* Impulses of another load, of which two sweeps make little: what is left of them. */
+TEST(what_packs_leave_undone_adds_no_energy)
+{
+  int shortened = 0;
+  for (uint64_t seed = 1; seed <= 12; ++seed) {
+    double least[2];
+    for (int packed = 0; packed < 2; ++packed) {
+      problem *p = packed ? &one : &two;
+      problem_make(p, seed, 0.5, 2);
+      problem_link(p, packed ? hapi_pack_work_best() : NULL);
+      for (uint32_t i = 0; i < p->solver.row_count; ++i) {
+        p->rows[i].impulse *= 1e5;
+      }
+      rows_ready(p, hapi_contact_ready, hapi_row_ready);
+      double apart;
+      hapi_solver_run(&p->solver);
+      CHECK(packed == (p->solver.packs.count > 0));
+      bool gives = energy_beyond(p, &apart) > 0.0 && p->solver.residual > HAPI_UNSOLVED;
+      hapi_solver_calm(&p->solver);
+      double energy = energy_beyond(p, &apart);
+      CHECK_SAY(energy <= 1e-9, "seed %d, packed %d: %g J", (int)seed, packed, energy);
+      CHECK_SAY(apart <= 1e-9, "seed %d, packed %d: %g", (int)seed, packed, apart);
+      CHECK(!p->solver.packs.in_use);
+      (void)rows_miss(p); /* checks the bounds */
+      least[packed] = energy;
+      shortened += gives && packed;
+    }
+    CHECK_SAY(least[1] < 0.8 * least[0], "seed %d: %g and %g J", (int)seed, least[1], least[0]);
+  }
+  CHECK_SAY(shortened >= 6, "%d", shortened);
+}
+
 /* Without friction there is one answer: rows one by one find it, too. */
 TEST(rows_one_by_one_end_there_too)
 {

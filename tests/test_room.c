@@ -210,7 +210,7 @@ TEST(a_tick_that_has_time_for_all_has_all)
   contact_world *w = pile_new(6, 1000.0);
   pile_end end = pile_push(w, 0.3);
   CHECK(end.stats.model.range_bodies == 77 && end.stats.room.range_cut == 0);
-  CHECK(end.stats.room.range_most == 138 && end.stats.room.turns == 0);
+  CHECK(end.stats.room.range_most == 156 && end.stats.room.turns == 0);
   CHECK_NEAR(end.stats.room.update_ns, 12.0, 1e-12);
   CHECK(end.stats.room.tick_work == 66666);
 }

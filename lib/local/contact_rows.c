@@ -545,6 +545,7 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   set_normal(facts, c, &solver->rows[first], &rows->sources[first], sample);
   rows_note_plain(&solver->rows[first], c, facts, kept);
   solver->row_count += count;
+  rows->kept += count;
   hapi_contact_again(solver, first, count);
   return true;
 }
@@ -576,6 +577,7 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
   if (!facts->bounces && rows_stay(rows, &c, memory)) {
     HAPI_ASSERT(rows_ask_alike(rows, &c, memory));
     rows->solver.row_count += kept->count;
+    rows->kept += kept->count;
     hapi_contact_stands(&rows->solver, kept->by_mass);
     return true;
   }

@@ -35,7 +35,7 @@ typedef struct hapi_work {
   uint64_t most; /* of a tick, solves stop there; 0: no bound */
   uint64_t done; /* in this tick */
   uint64_t all;  /* since start */
-  double usual;  /* about the median of a tick, a row counted as ROW_KEPT (contact_step.c) */
+  double usual;  /* about the median of a tick, each row counted as kept */
 } hapi_work;
 
 typedef struct hapi_rows {
@@ -43,7 +43,8 @@ typedef struct hapi_rows {
   hapi_work work;
   hapi_row_source *sources; /* of the rows; capacity */
   uint32_t capacity;
-  double drift; /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
+  uint32_t kept; /* of the tick before, in this one */
+  double drift;  /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
   double hand;  /* J s^2, the least F^2 / (k^2 a) of the tick's springs to hands, with F of the tick
                    before; HUGE_VAL: none */
   bool touched; /* by a pointer that has been in reach since */

@@ -184,17 +184,6 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, boo
 
 /* ---- sweeps ---- */
 
-/* The rows that are in no pack. */
-static uint32_t loose_count(const hapi_solver *solver)
-{
-  return solver->packs.in_use ? solver->packs.loose_count : 1;
-}
-
-static hapi_loose_rows loose_at(const hapi_solver *solver, uint32_t i)
-{
-  return solver->packs.in_use ? solver->packs.loose[i] : (hapi_loose_rows){0, solver->row_count};
-}
-
 static inline void correction_note(const hapi_row *row, double change, hapi_corrections *io)
 {
   double correction = change * row->response;
@@ -291,8 +280,8 @@ static void triples_start(hapi_solver *solver)
   if (solver->packs.in_use) {
     solver->packs.work->push(&solver->packs, solver->v);
   }
-  for (uint32_t i = 0; i < loose_count(solver); ++i) {
-    hapi_loose_rows at = loose_at(solver, i);
+  for (uint32_t i = 0; i < hapi_loose_count(solver); ++i) {
+    hapi_loose_rows at = hapi_loose_at(solver, i);
     for (uint32_t k = at.first; k < at.end; k += solver->rows[k].triple ? 3 : 1) {
       if (solver->rows[k].triple) {
         triple_start(solver, &solver->rows[k]);
@@ -443,17 +432,17 @@ static void sweep_back(hapi_solver *solver, uint32_t begin, uint32_t end, hapi_c
 static void rows_sweep(hapi_solver *solver)
 {
   hapi_corrections sum = {0.0, 0.0};
-  uint32_t runs = loose_count(solver);
+  uint32_t runs = hapi_loose_count(solver);
   bool forward = solver->sweeps++ % 2 == 0;
   for (uint32_t i = 0; forward && i < runs; ++i) {
-    hapi_loose_rows at = loose_at(solver, i);
+    hapi_loose_rows at = hapi_loose_at(solver, i);
     update_group(solver, at.first, at.end, &sum);
   }
   if (solver->packs.in_use) {
     solver->packs.work->sweep(&solver->packs, solver->v, forward, &sum);
   }
   for (uint32_t i = runs; !forward && i > 0; --i) {
-    hapi_loose_rows at = loose_at(solver, i - 1);
+    hapi_loose_rows at = hapi_loose_at(solver, i - 1);
     sweep_back(solver, at.first, at.end, &sum);
   }
   solver->residual = sum.largest;
@@ -524,8 +513,8 @@ static void way_begin(const hapi_solver *solver, sweep_way *way)
   if (at > 0) {
     memcpy(way->x, solver->packs.impulse, at * sizeof *way->x);
   }
-  for (uint32_t i = 0; i < loose_count(solver); ++i) {
-    hapi_loose_rows run = loose_at(solver, i);
+  for (uint32_t i = 0; i < hapi_loose_count(solver); ++i) {
+    hapi_loose_rows run = hapi_loose_at(solver, i);
     for (uint32_t k = run.first; k < run.end; ++k) {
       way->x[at++] = solver->rows[k].impulse;
     }
@@ -563,8 +552,8 @@ static void way_go_on(hapi_solver *solver, sweep_way *way)
   if (at > 0) {
     way->work->way_go_on(&solver->packs.impulse[0][0][0], way->x, way->p, share, at);
   }
-  for (uint32_t i = 0; i < loose_count(solver); ++i) {
-    hapi_loose_rows run = loose_at(solver, i);
+  for (uint32_t i = 0; i < hapi_loose_count(solver); ++i) {
+    hapi_loose_rows run = hapi_loose_at(solver, i);
     for (uint32_t k = run.first; k < run.end; ++k) {
       number_go_on(&solver->rows[k].impulse, &way->x[at], &way->p[at], share);
       ++at;
@@ -634,11 +623,36 @@ static bool stays_dear(hapi_solver *solver)
   return true;
 }
 
+void hapi_solver_rebuild(hapi_solver *solver)
+{
+  memcpy(solver->v, solver->free, solver->body_count * sizeof *solver->v);
+  if (solver->packs.in_use) {
+    solver->packs.work->push(&solver->packs, solver->v);
+  }
+  for (uint32_t i = 0; i < hapi_loose_count(solver); ++i) {
+    hapi_loose_rows at = hapi_loose_at(solver, i);
+    for (uint32_t k = at.first; k < at.end; ++k) {
+      hapi_row *row = &solver->rows[k];
+      double impulse = row->impulse;
+      if (row->inverse != 0.0 && impulse != 0.0) {
+        row->impulse = 0.0;
+        hapi_row_push(solver, row, impulse);
+      }
+    }
+  }
+}
+
 void hapi_solver_sweep_on(hapi_solver *solver)
 {
+  if (solver->packs.in_use) {
+    hapi_packs_load(&solver->packs, solver->rows);
+  }
   for (uint32_t i = 0; i < 2 + CALM_UPDATES / solver->row_count; ++i) {
     rows_sweep(solver);
-    solver->updates += solver->row_count;
+    solver->updates += sweep_cost(solver);
+  }
+  if (solver->packs.in_use) {
+    hapi_packs_store(&solver->packs, solver->rows);
   }
   check_finite(solver);
 }
@@ -760,7 +774,7 @@ void hapi_solver_run(hapi_solver *solver)
   bool tried = dear;
   uint32_t dearest = 0;
   sweep_way way = {0};
-  solver->packs.in_use = false;
+  solver->packs.in_use = solver->packs.stored = false;
   for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
     hapi_row_ready(solver, i);
   }
@@ -836,6 +850,7 @@ void hapi_solver_run(hapi_solver *solver)
   if (solver->packs.in_use) {
     hapi_packs_store(&solver->packs, solver->rows);
     solver->packs.in_use = false;
+    solver->packs.stored = true;
   }
   note_vain(solver, dearest);
   check_finite(solver);

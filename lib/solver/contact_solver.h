@@ -147,8 +147,23 @@ static inline void hapi_contact_moved(hapi_solver *solver)
 
 /* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */
 
-/* A few sweeps more, two at least. */
+/* A few sweeps more, two at least, from the impulses of the rows. */
 void hapi_solver_sweep_on(hapi_solver *solver);
+
+/* The velocities that the impulses make, of rows and packs alike: what was kept along is off by the
+ * rounding of the largest impulse that there ever was. */
+void hapi_solver_rebuild(hapi_solver *solver);
+
+/* The rows that are in no pack. */
+static inline uint32_t hapi_loose_count(const hapi_solver *solver)
+{
+  return solver->packs.in_use ? solver->packs.loose_count : 1;
+}
+
+static inline hapi_loose_rows hapi_loose_at(const hapi_solver *solver, uint32_t i)
+{
+  return solver->packs.in_use ? solver->packs.loose[i] : (hapi_loose_rows){0, solver->row_count};
+}
 
 /* N s, the largest impulse of a friction under a load; of a ball the radius. */
 static inline double hapi_friction_most(const hapi_row *friction, double load)

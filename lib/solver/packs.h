@@ -152,6 +152,7 @@ typedef struct hapi_packs {
   uint32_t loose_rows;
   uint32_t height; /* the highest level; 0: not known */
   bool in_use;     /* the impulses of packed rows are here */
+  bool stored;     /* they were, and the rows have them as well */
   hapi_packed_rows known;
 } hapi_packs;
 

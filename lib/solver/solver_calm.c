@@ -33,6 +33,8 @@ typedef struct rays {
 /* The island of a body; all are one where there are too many bodies to tell. */
 static uint32_t island_of(const hapi_solver *solver, const rays *r, uint32_t body)
 {
+  /* set for every body by find_islands */
+  /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.UndefReturn) */
   return solver->body_count <= HAPI_SOLVER_BODIES ? r->root[body] : 0;
 }
 
@@ -49,29 +51,23 @@ static void find_islands(const hapi_solver *solver, rays *out)
   for (uint32_t i = 0; i < solver->body_count; ++i) {
     out->root[i] = (uint16_t)i;
   }
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    const hapi_row *row = &solver->rows[i];
-    if (row->inverse != 0.0 && row->paired && hapi_row_moves_a(row)) {
-      hapi_unite(out->root, row->a, row->b);
+  for (uint32_t i = 0; solver->packs.in_use && i < solver->packs.packable_count; ++i) {
+    const hapi_packable *packable = &solver->packs.packables[i];
+    if (packable->place != HAPI_NO_PLACE && solver->packs.of[packable->pack].paired) {
+      hapi_unite(out->root, packable->a, packable->b);
+    }
+  }
+  for (uint32_t i = 0; i < hapi_loose_count(solver); ++i) {
+    hapi_loose_rows at = hapi_loose_at(solver, i);
+    for (uint32_t k = at.first; k < at.end; ++k) {
+      const hapi_row *row = &solver->rows[k];
+      if (row->inverse != 0.0 && row->paired && hapi_row_moves_a(row)) {
+        hapi_unite(out->root, row->a, row->b);
+      }
     }
   }
   for (uint32_t i = 0; i < solver->body_count; ++i) {
     out->root[i] = hapi_root(out->root, (uint16_t)i);
-  }
-}
-
-/* The velocities that the impulses make: what was kept along is off by the rounding of the largest
- * impulse that there ever was. */
-static void velocities_rebuild(hapi_solver *solver)
-{
-  memcpy(solver->v, solver->free, solver->body_count * sizeof *solver->v);
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    hapi_row *row = &solver->rows[i];
-    if (row->inverse != 0.0 && row->impulse != 0.0) {
-      double impulse = row->impulse;
-      row->impulse = 0.0;
-      hapi_row_push(solver, row, impulse);
-    }
   }
 }
 
@@ -87,7 +83,7 @@ static bool rays_measure(hapi_solver *solver, rays *r)
   uint32_t count = solver->body_count <= HAPI_SOLVER_BODIES ? solver->body_count : 1;
   bool all_calm = true;
   solver->updates += 2 * (uint64_t)solver->row_count; /* goes through them twice */
-  velocities_rebuild(solver);
+  hapi_solver_rebuild(solver);
   memset(r->of, 0, count * sizeof r->of[0]);
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
@@ -139,13 +135,14 @@ void hapi_solver_calm(hapi_solver *solver)
   if (solver->row_count == 0 || solver->residual < HAPI_UNSOLVED) {
     return;
   }
+  solver->packs.in_use = solver->packs.stored;
   find_islands(solver, &r);
-  if (!rays_measure(solver, &r)) {
-    return;
-  }
-  impulses_shorten(solver, &r);
-  hapi_solver_sweep_on(solver);
   if (rays_measure(solver, &r)) {
     impulses_shorten(solver, &r);
+    hapi_solver_sweep_on(solver);
+    if (rays_measure(solver, &r)) {
+      impulses_shorten(solver, &r);
+    }
   }
+  solver->packs.in_use = false;
 }

@@ -70,10 +70,12 @@ typedef struct hapi_tick_load {
   double spent_ns;
 } hapi_tick_load;
 
-/* The work of a tick is counted in row updates of the solver: what it takes to make a row, and the
- * least that a row costs, which is made and swept twice in each of two solves. */
-#define HAPI_ROW_MAKING 5u
-#define HAPI_ROW_WORK 9u
+/* The work of a tick is counted in row updates of the solver: what it takes to make a row, or to
+ * keep it, and the least that a row costs, of which a quarter is made and all is swept twice in
+ * each of two solves. */
+#define HAPI_ROW_MAKING 8u
+#define HAPI_ROW_KEEPING 2u
+#define HAPI_ROW_WORK 8u
 
 /* Of ticks of model CONTACT. */
 typedef struct hapi_tick_work {

@@ -43,7 +43,6 @@
  * 20 us, leaves the rest to the next ticks, where the rest is little. */
 #define ENOUGH_LEAST 1500.0 /* row updates */
 #define ENOUGH_SHARE 1.5
-#define ROW_KEPT 2.0     /* row updates that a row costs besides: most are kept */
 #define USUAL_STEP 0.002 /* a tick: doubles in 350 of them */
 #define USUAL_ROW 4.0    /* row updates, at least for each row: kept, and swept twice */
 
@@ -100,6 +99,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   memset(solver->free[HAPI_STATIC_ROW], 0, sizeof solver->free[0]);
   solver->body_count = 1;
   hapi_solver_clear(solver);
+  rows->kept = 0;
   solver->apart = true;
   rows->hand = HUGE_VAL;
   bodies->resting = bodies->quiet = 0;
@@ -465,11 +465,11 @@ static void rows_set_coarse(hapi_rows *rows, bool reaches)
   rows->solver.coarse = rows->touched ? hapi_min(before, most) : most;
 }
 
-/* Row updates of this tick, without the making of rows. */
+/* Row updates of this tick, as if all rows were kept. */
 static double work_counted(const hapi_rows *rows)
 {
-  return (double)rows->work.done -
-         ((double)HAPI_ROW_MAKING - ROW_KEPT) * (double)rows->solver.row_count;
+  uint32_t made = rows->solver.row_count - rows->kept;
+  return (double)rows->work.done - (double)(HAPI_ROW_MAKING - HAPI_ROW_KEEPING) * (double)made;
 }
 
 /* Row updates, of the next solve. */
@@ -617,7 +617,9 @@ static void rows_make(hapi_tick *tick)
     hapi_brace_rows(&tick->bodies, rows, tick->facts.period);
   }
   rows->solver.apart &= rows->solver.row_count == of_pointers;
-  rows->work.done = HAPI_ROW_MAKING * (uint64_t)rows->solver.row_count;
+  HAPI_ASSERT(rows->kept <= rows->solver.row_count);
+  rows->work.done = HAPI_ROW_KEEPING * (uint64_t)rows->kept +
+                    HAPI_ROW_MAKING * (uint64_t)(rows->solver.row_count - rows->kept);
 }
 
 void hapi_contact_step(hapi_tick *tick)
