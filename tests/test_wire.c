@@ -568,6 +568,12 @@ static void spoil_joint(hapi_model *m, hapi_near *n)
   (void)n;
   hapi_model_joints(m)[0].body_a = HAPI_SLOT_NONE;
 }
+static void spoil_triangle(hapi_model *m, hapi_near *n)
+{
+  (void)m;
+  hapi_near_geoms(n)[0].shape.hull_count = 3;
+  hapi_near_geoms(n)[0].open_edges = 0x20;
+}
 static void spoil_edges(hapi_model *m, hapi_near *n)
 {
   (void)m;
@@ -622,6 +628,7 @@ static const false_member lies[] = {
     {"pointer", spoil_pointer, HAP_OK, "contact"},
     {"joint", spoil_joint, HAP_OK, "joint"},
     {"edges", spoil_edges, HAP_OK, "edges"},
+    {"triangle", spoil_triangle, HAP_OK, "a triangle has edges"},
     {"hull", spoil_hull, HAP_OK, "points"},
     {"rate", spoil_rate, HAP_OK, "head"},
     {"tool", spoil_tool, HAP_OK, "tool"},

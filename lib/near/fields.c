@@ -241,7 +241,7 @@ static uint32_t field_near(hapi_nearby *nearby, dGeomID geom, const double box[6
     }
     return HAPI_NEAR_TRIANGLES;
   }
-  hapi_meshes_join(meshes, found);
+  hapi_meshes_join(meshes, found, local);
   for (uint32_t i = 0; i < found; ++i) {
     for (int k = 0; k < 3; ++k) {
       double *corner = meshes->found[i].corners + 3 * k;

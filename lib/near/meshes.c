@@ -8,6 +8,7 @@
 #include "base/vec.h"
 #include "near/near.h"
 #include "proximity/triangle.h"
+#include "sync/mesh_filter.h"
 
 /* Triangles of static meshes near a box. ODE's own search keeps a cache that the whole process
  * shares, and gives contacts, not triangles; so the triangles are read once, in the order of the
@@ -149,16 +150,44 @@ static bool same_point(const double *a, const double *b)
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
+/* False: it has no area. */
+static bool triangle_normal(const double corners[9], double out[3])
+{
+  double sides[2][3];
+  hapi_v3_sub(corners + 3, corners, sides[0]);
+  hapi_v3_sub(corners + 6, corners, sides[1]);
+  hapi_v3_cross(sides[0], sides[1], out);
+  return hapi_v3_norm(out) > 0.0;
+}
+
+static uint64_t point_hash(const double point[3])
+{
+  uint64_t mixed = 0;
+  for (int k = 0; k < 3; ++k) {
+    uint64_t bits;
+    memcpy(&bits, &point[k], sizeof bits);
+    mixed = (mixed ^ bits) * 0x9e3779b97f4a7c15u;
+    mixed ^= mixed >> 32;
+  }
+  return mixed;
+}
+
+static uint32_t place_of(uint64_t hash)
+{
+  return (uint32_t)(hash ^ (hash >> 29)) & (HAPI_EDGE_PLACES - 1);
+}
+
+static uint32_t next_place(uint32_t at)
+{
+  return (at + 1) & (HAPI_EDGE_PLACES - 1);
+}
+
 /* Whether the triangle of edge `other` lies level with that of `edge` or above it. */
 static bool edge_is_closed_by(const hapi_meshes *meshes, uint32_t edge, uint32_t other)
 {
-  const double *triangle = meshes->found[edge / 3].corners;
-  double sides[2][3];
   double normal[3];
   double rise[3];
-  hapi_v3_sub(triangle + 3, triangle, sides[0]);
-  hapi_v3_sub(triangle + 6, triangle, sides[1]);
-  hapi_v3_cross(sides[0], sides[1], normal);
+  (void)triangle_normal(meshes->found[edge / 3].corners, normal);
   hapi_v3_sub(edge_corner(meshes, other, 2), edge_corner(meshes, edge, 0), rise);
   return hapi_v3_dot(rise, normal) >= -1e-4 * hapi_v3_norm(rise) * hapi_v3_norm(normal);
 }
@@ -166,21 +195,10 @@ static bool edge_is_closed_by(const hapi_meshes *meshes, uint32_t edge, uint32_t
 static void meet_edge(hapi_meshes *meshes, uint32_t edge)
 {
   HAPI_ASSERT_INDEX(edge, 3 * HAPI_NEAR_TRIANGLES); /* less than half of the places */
-  uint32_t mask = HAPI_EDGE_PLACES - 1;
   /* Of both directions the same. */
-  uint64_t sum = 0;
-  for (uint32_t end = 0; end < 2; ++end) {
-    uint64_t mixed = 0;
-    for (int k = 0; k < 3; ++k) {
-      uint64_t bits;
-      memcpy(&bits, &edge_corner(meshes, edge, end)[k], sizeof bits);
-      mixed = (mixed ^ bits) * 0x9e3779b97f4a7c15u;
-      mixed ^= mixed >> 32;
-    }
-    sum += mixed;
-  }
-  uint32_t at = ((uint32_t)(sum ^ (sum >> 29))) & mask;
-  for (; meshes->places[at] != 0; at = (at + 1) & mask) {
+  uint32_t at =
+      place_of(point_hash(edge_corner(meshes, edge, 0)) + point_hash(edge_corner(meshes, edge, 1)));
+  for (; meshes->places[at] != 0; at = next_place(at)) {
     uint32_t other = meshes->places[at] - 1;
     const double *p = edge_corner(meshes, edge, 0);
     const double *q = edge_corner(meshes, edge, 1);
@@ -200,7 +218,72 @@ static void meet_edge(hapi_meshes *meshes, uint32_t edge)
   meshes->places[at] = edge + 1;
 }
 
-void hapi_meshes_join(hapi_meshes *meshes, uint32_t count)
+/* ---- how far a contact may lean: no farther than the triangles around its own ---- */
+
+/* Corners are numbered as the edges that begin there. */
+static void meet_corner(hapi_meshes *meshes, uint32_t corner)
+{
+  HAPI_ASSERT_INDEX(corner, 3 * HAPI_NEAR_TRIANGLES);
+  const double *point = edge_corner(meshes, corner, 0);
+  uint32_t at = place_of(point_hash(point));
+  while (meshes->places[at] != 0 &&
+         !same_point(edge_corner(meshes, meshes->places[at] - 1, 0), point)) {
+    at = next_place(at);
+  }
+  meshes->next_corner[corner] = meshes->places[at];
+  meshes->places[at] = corner + 1;
+}
+
+/* The least cosine between a triangle and those that share a corner of the chain with it. */
+static void lean_of_chain(const hapi_meshes *meshes, uint32_t first, double (*normals)[3],
+                          double *io_cosines)
+{
+  for (uint32_t i = first; i != 0; i = meshes->next_corner[i - 1]) {
+    for (uint32_t k = first; k != 0; k = meshes->next_corner[k - 1]) {
+      double *least = &io_cosines[(i - 1) / 3];
+      *least = fmin(*least, hapi_v3_dot(normals[(i - 1) / 3], normals[(k - 1) / 3]));
+    }
+  }
+}
+
+/* Whether the mesh ends there: an edge whose other triangle is outside the box is too. */
+static bool has_border(const hapi_meshes *meshes, uint32_t triangle, const double box[6])
+{
+  for (uint32_t k = 0; k < 3; ++k) {
+    double own[6];
+    for (uint32_t end = 0; end < 2; ++end) {
+      grow_box(own, edge_corner(meshes, 3 * triangle + k, end), end == 0);
+    }
+    if ((meshes->found[triangle].joined & (1u << k)) == 0 && hapi_boxes_meet(own, box)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+static void find_leans(hapi_meshes *meshes, uint32_t count, const double box[6])
+{
+  double normals[HAPI_NEAR_TRIANGLES][3];
+  double cosines[HAPI_NEAR_TRIANGLES];
+  memset(meshes->places, 0, sizeof meshes->places);
+  for (uint32_t corner = 0; corner < 3 * count; ++corner) {
+    meet_corner(meshes, corner);
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    if (triangle_normal(meshes->found[i].corners, normals[i])) {
+      hapi_v3_scale(1.0 / hapi_v3_norm(normals[i]), normals[i], normals[i]);
+    }
+    cosines[i] = has_border(meshes, i, box) ? 0.0 : 1.0; /* at a border: any */
+  }
+  for (uint32_t at = 0; at < HAPI_EDGE_PLACES; ++at) {
+    lean_of_chain(meshes, meshes->places[at], normals, cosines);
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    meshes->found[i].open_edges |= hapi_mesh_lean(cosines[i]);
+  }
+}
+
+void hapi_meshes_join(hapi_meshes *meshes, uint32_t count, const double box[6])
 {
   memset(meshes->places, 0, sizeof meshes->places);
   for (uint32_t i = 0; i < count; ++i) {
@@ -210,6 +293,7 @@ void hapi_meshes_join(hapi_meshes *meshes, uint32_t count)
   for (uint32_t edge = 0; edge < 3 * count; ++edge) {
     meet_edge(meshes, edge);
   }
+  find_leans(meshes, count, box);
 }
 
 static uint32_t search_chunk(const hapi_mesh *mesh, uint32_t chunk, const double box[6],
@@ -257,7 +341,7 @@ uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], 
   if (found == FOUND_MAX) {
     return found; /* too many: the caller leaves them to ODE */
   }
-  hapi_meshes_join(meshes, found);
+  hapi_meshes_join(meshes, found, local);
   dQuaternion quat;
   dGeomGetQuaternion(geom, quat);
   for (uint32_t i = 0; i < found; ++i) {
@@ -267,16 +351,6 @@ uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], 
     }
   }
   return found;
-}
-
-/* False: it has no area. */
-static bool triangle_normal(const double corners[9], double out[3])
-{
-  double sides[2][3];
-  hapi_v3_sub(corners + 3, corners, sides[0]);
-  hapi_v3_sub(corners + 6, corners, sides[1]);
-  hapi_v3_cross(sides[0], sides[1], out);
-  return hapi_v3_norm(out) > 0.0;
 }
 
 bool hapi_triangles_nearest(const hapi_meshes *meshes, uint32_t count, const double center[3],

@@ -41,18 +41,20 @@ typedef struct hapi_meshes {
   uint32_t count;
   uint32_t capacity;
   hapi_near_triangle found[HAPI_NEAR_TRIANGLES];
-  uint32_t places[HAPI_EDGE_PLACES];  /* of their edges, + 1; open addressing */
-  double heights[HAPI_FIELD_CORNERS]; /* of a heightfield's cells; scratch */
-  bool said_unknown;                  /* of a heightfield's cells, once a session */
+  uint32_t places[HAPI_EDGE_PLACES]; /* of their edges or corners, + 1; open addressing; scratch */
+  uint32_t next_corner[3 * HAPI_NEAR_TRIANGLES]; /* + 1, of those at the same place; scratch */
+  double heights[HAPI_FIELD_CORNERS];            /* of a heightfield's cells; scratch */
+  bool said_unknown;                             /* of a heightfield's cells, once a session */
 } hapi_meshes;
 
 /* Triangles of a static mesh that meet a box of the world, into near.meshes.found. walk: the
  * number of the model that they are for; HAPI_NEAR_TRIANGLES: there may be more, or there is no
  * memory for them, and they are not to be used. */
 uint32_t hapi_mesh_near(hapi_nearby *nearby, dGeomID geom, const double box[6], uint64_t walk);
-/* Finds the edges of the first count of them that can be touched. Corners that two triangles share
- * have the same bits. */
-void hapi_meshes_join(hapi_meshes *meshes, uint32_t count);
+/* Finds the edges of the first count of them that can be touched, and how far a contact may lean.
+ * Corners that two triangles share have the same bits. box: that they meet, and that nothing is
+ * touched outside of. */
+void hapi_meshes_join(hapi_meshes *meshes, uint32_t count, const double box[6]);
 /* Nearest points of a ball (a), outside of the surface, and the first count of them (b), which have
  * two sides. False: there are none. */
 bool hapi_triangles_nearest(const hapi_meshes *meshes, uint32_t count, const double center[3],

@@ -10,13 +10,29 @@
 
 /* A body that slides over a mesh must not feel the seams between its triangles. A contact with the
  * triangle's own normal always counts. A contact that leans over an edge counts only if no
- * neighbour continues behind that edge in the same plane or higher. */
+ * neighbour continues behind that edge in the same plane or higher, and if it does not lean farther
+ * than one of the triangles around: else a box that lies on a flat hill would run with its front
+ * against the hill's top. */
 
 #define OWN_NORMAL_COSINE 0.99996 /* 0.5 degrees */
 #define TRIANGLE 8u
 
 #define BEHIND_SINE 1e-3   /* 0.06 degrees */
 #define FLAT_COSINE 0.9962 /* 5 degrees, as of patches of two faces */
+#define FLAT_ANGLE 0.0873
+#define LEAN_STEPS 255.0 /* of a right angle */
+
+uint32_t hapi_mesh_lean(double cosine)
+{
+  double angle = acos(hapi_max(hapi_min(cosine, 1.0), 0.0));
+  return (uint32_t)ceil(LEAN_STEPS * angle / M_PI_2) << HAPI_TRIANGLE_LEAN;
+}
+
+static bool leans_too_far(uint32_t open_edges, double cosine)
+{
+  double steps = open_edges >> HAPI_TRIANGLE_LEAN;
+  return steps < LEAN_STEPS && cosine < cos(FLAT_ANGLE + steps * M_PI_2 / LEAN_STEPS);
+}
 
 void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
 {
@@ -44,7 +60,7 @@ void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
 bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double normal[3])
 {
   HAPI_ASSERT_UNIT(normal);
-  HAPI_ASSERT((open_edges & ~31u) == 0);
+  HAPI_ASSERT((open_edges & ~HAPI_TRIANGLE_BITS) == 0);
   double sides[3][3];
   double own[3];
   if ((open_edges & TRIANGLE) == 0) {
@@ -61,6 +77,9 @@ bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double n
   }
   if (fabs(lean) >= OWN_NORMAL_COSINE) {
     return true;
+  }
+  if (leans_too_far(open_edges, fabs(lean))) {
+    return false;
   }
   for (int i = 0; i < 3; ++i) {
     double outward[3];

@@ -18,7 +18,7 @@ typedef struct hapi_near_geom {
   uint32_t hull_first; /* into the message's points */
   uint32_t open_edges; /* bit 3: a triangle of a mesh; bits 0, 1, 2: its edges that can be touched,
                           because no neighbour continues its plane or rises there; bit 4: it has
-                          one side (HAPI_TRIANGLE_SOLID) */
+                          one side (HAPI_TRIANGLE_SOLID); bits 8 to 15: hapi_mesh_lean */
   hap_pose pose;       /* in the body's frame; world for the static world */
 } hapi_near_geom;
 

@@ -4,6 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/vec.h"
+#include "sync/mesh_filter.h"
 #include "wire/block.h"
 #include "wire/world.h"
 
@@ -372,6 +373,9 @@ static const char *geom_accept(const accepting *a, uint32_t place)
   }
   if (geom->open_edges != 0 && !(hull && geom->shape.hull_count == 3)) {
     return "a geom has edges of a triangle and is none";
+  }
+  if ((geom->open_edges & ~HAPI_TRIANGLE_BITS) != 0) {
+    return "a triangle has edges that cannot be";
   }
   return NULL;
 }

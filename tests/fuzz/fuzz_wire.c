@@ -7,6 +7,7 @@
 #include "fuzz.h"
 
 #include "sync/exchange.h"
+#include "sync/mesh_filter.h"
 #include "wire/wire.h"
 
 /* Small, so that an input takes little time. The corpus is of such a world. */
@@ -48,6 +49,7 @@ static void model_check(hapi_model *model, hapi_near *near)
     FUZZ_CHECK(g->shape.kind != HAPI_SHAPE_HULL ||
                g->hull_first + g->shape.hull_count <= near->point_count);
     FUZZ_CHECK(g->open_edges == 0 || g->shape.hull_count == 3);
+    FUZZ_CHECK((g->open_edges & ~HAPI_TRIANGLE_BITS) == 0);
   }
   for (uint32_t i = 0; i < near->pair_count; ++i) {
     const hapi_near_pair *pair = &hapi_near_pairs(near)[i];
