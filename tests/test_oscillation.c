@@ -30,14 +30,19 @@ static hapi_pointer *swing_pointer(void)
   return p;
 }
 
+static void swing_follow(void)
+{
+  hapi_oscillation_follow(&f.tick.guard, &f.tick.facts, &f.tick.pointers, &f.tick.bodies,
+                          &f.tick.touches);
+}
+
 static void swing_tick(double force, double way, double speed)
 {
   hapi_pointer *p = &f.pointers[0];
   hapi_v3_set(p->wrench.force, force, 0.0, 0.0);
   hapi_v3_set(p->handle.position, way, 0.0, 0.0);
   hapi_v3_set(p->handle.velocity, speed, 0.0, 0.0);
-  hapi_oscillation_follow(&f.tick.guard, &f.tick.facts, &f.tick.pointers, &f.tick.bodies,
-                          &f.tick.touches);
+  swing_follow();
 }
 
 /* Seconds of a spring of 1000 N/m that swings with an amplitude, times exp(growth t). */
@@ -420,6 +425,26 @@ TEST(a_device_runs_away_from_declared_forces_too)
       speed += 4000.0 * way * T; /* of 0.25 kg */
     }
     CHECK(1000.0 * way >= 6.0 && swing_took() == (any != 0));
+  }
+}
+
+/* It goes on at 0.5 m/s, and the force turns until it is right against it. */
+TEST(a_hand_about_which_the_force_turns_does_not_run_away)
+{
+  for (int faster = 0; faster < 2; ++faster) {
+    hapi_pointer *p = swing_pointer();
+    double way = 1e-6;
+    double speed = 0.05;
+    for (int i = 0; i < 100 && 1000.0 * way < 6.0; ++i) {
+      hapi_v3_set(p->wrench.force, -1000.0 * way, 0.0, 0.0);
+      hapi_v3_set(p->handle.position, way, 0.0, 0.0);
+      hapi_v3_set(p->handle.velocity, speed, 0.0, 0.0);
+      p->handle.velocity[1] = faster != 0 ? 0.3 : sqrt(0.25 - speed * speed);
+      swing_follow();
+      way += speed * T;
+      speed += 4000.0 * way * T; /* of 0.25 kg */
+    }
+    CHECK(1000.0 * way >= 6.0 && speed < 0.5 && swing_took() == (faster != 0));
   }
 }
 

@@ -18,6 +18,9 @@
  * A hand that presses does not: it slows down, or gains for a while and then less, as its own force
  * does not follow k x. With x growing as t^n the gain v^2 / W falls as x^(-2/n).
  *
+ * The square of its whole speed grows as much. It does not where a hand goes on as fast while the
+ * force turns about it: there only the part against the force grows.
+ *
  * So the gain is compared from level to level of force. Where it has stayed, the force is taken
  * away in some ms, which asks the device. One of the wrong sign accelerates no more: the fault
  * latches. A hand goes on, or faster, and the force comes back. */
@@ -28,33 +31,41 @@ enum {
   RUNAWAY_ASKING
 };
 
-/* On from here, with a force of newtons, to a force of level. */
-static void runaway_level(hapi_runaway *r, double level, double newtons, double speed)
+/* A tick: the force that works on the device, and how the device goes. */
+typedef struct runaway_tick {
+  double newtons;
+  double against; /* m/s */
+  double square;  /* m2/s2, of the whole speed */
+} runaway_tick;
+
+/* On from here to a force of level. */
+static void runaway_level(hapi_runaway *r, double level, const runaway_tick *now)
 {
   r->level = level;
-  r->newtons = newtons;
-  r->speed = speed;
+  r->newtons = now->newtons;
+  r->speed = now->against;
+  r->square = now->square;
   r->work = r->way = 0.0;
 }
 
 /* At a level: what was gained against the force since the one before. */
-static void runaway_judge(hapi_runaway *r, double newtons, double stiffness, double limit,
-                          double speed)
+static void runaway_judge(hapi_runaway *r, const runaway_tick *now, double stiffness, double limit)
 {
-  double gained = speed * speed - r->speed * r->speed;
+  double gained = now->against * now->against - r->speed * r->speed;
+  bool faster = now->square - r->square >= 0.5 * gained;
   double gain = r->work > 0.0 ? gained / r->work : 0.0; /* 1/kg */
   bool stays = r->gain > 0.0 && gain >= HAPI_SAFETY_RUNAWAY_KEPT * r->gain &&
                gain >= 2.0 / HAPI_SAFETY_RUNAWAY_MASS;
   double full = HAPI_SAFETY_RUNAWAY_FULL * limit;
   /* A force that came by no way of the device, as of a body put there, says nothing. */
-  bool followed = newtons - r->newtons <= HAPI_SAFETY_SWING_STIFFER * stiffness * r->way;
-  if (stays && followed) {
+  bool followed = now->newtons - r->newtons <= HAPI_SAFETY_SWING_STIFFER * stiffness * r->way;
+  if (stays && faster && followed) {
     r->stage = RUNAWAY_ASKING;
     r->acceleration = 0.5 * gained / r->way; /* mean on that way */
     r->seconds = 0.0;
   }
   r->gain = gain;
-  runaway_level(r, r->level < full ? full : 2.0 * r->level, newtons, speed);
+  runaway_level(r, r->level < full ? full : 2.0 * r->level, now);
 }
 
 /* True: without force it accelerates no more. */
@@ -78,29 +89,30 @@ bool hapi_runaway_follow(hapi_runaway *runaway, const hapi_pointer *pointer, con
                          double stiffness, double limit, double seconds)
 {
   hapi_runaway *r = runaway;
-  double newtons = hapi_v3_norm(force);
+  runaway_tick now = {.newtons = hapi_v3_norm(force)};
   double speed[3]; /* of the hand in its base */
   hapi_v3_sub(pointer->handle.velocity, pointer->frame.carries.linear, speed);
-  double against = newtons > 0.0 ? -hapi_v3_dot(force, speed) / newtons : 0.0;
+  now.against = now.newtons > 0.0 ? -hapi_v3_dot(force, speed) / now.newtons : 0.0;
+  now.square = hapi_v3_dot(speed, speed);
   bool other = pointer->contacts != r->contacts; /* what is touched has changed: nobody can tell */
   r->contacts = pointer->contacts;
   if (r->stage == RUNAWAY_ASKING && !other) {
-    return runaway_ask(r, against, seconds);
+    return runaway_ask(r, now.against, seconds);
   }
   r->loss = hapi_max(r->loss - seconds / HAPI_SAFETY_RAMP_IN_S, 0.0);
-  if (other || !(against > 0.0) || !(limit > 0.0) || pointer->device.jumped) {
+  if (other || !(now.against > 0.0) || !(limit > 0.0) || pointer->device.jumped) {
     r->stage = RUNAWAY_IDLE;
     return false;
   }
-  r->way += against * seconds;
-  r->work += newtons * against * seconds;
+  r->way += now.against * seconds;
+  r->work += now.newtons * now.against * seconds;
   double begin = HAPI_SAFETY_RUNAWAY_BEGIN * limit;
-  if (r->stage == RUNAWAY_IDLE && newtons < begin) {
+  if (r->stage == RUNAWAY_IDLE && now.newtons < begin) {
     r->stage = RUNAWAY_GROWING;
     r->gain = 0.0;
-    runaway_level(r, begin, newtons, against);
-  } else if (r->stage == RUNAWAY_GROWING && newtons >= r->level) {
-    runaway_judge(r, newtons, stiffness, limit, against);
+    runaway_level(r, begin, &now);
+  } else if (r->stage == RUNAWAY_GROWING && now.newtons >= r->level) {
+    runaway_judge(r, &now, stiffness, limit);
   }
   return false;
 }

@@ -67,7 +67,8 @@ typedef struct hapi_runaway {
   double loss;       /* 0..1, share of the force that this takes */
   double level;      /* N, the next one */
   double newtons;    /* at the last level */
-  double speed;      /* m/s, at the last level; when the force was gone */
+  double speed;      /* m/s against the force, at the last level; when the force was gone */
+  double square;     /* m2/s2, of the whole speed, at the last level */
   double work;       /* J, against the force since then */
   double way;        /* m, likewise */
   double gain;       /* 1/kg, up to the last level */
