@@ -468,7 +468,8 @@ def make():
         if random.random() < 0.7:
             scene.on_step(before=lambda s: (made, scene.push(body, (0, 0, 1))))
         threads = random.random() < 0.3
-        session = scene.session(drive="threads" if threads else "lockstep", rt_priority=0)
+        session = scene.session(drive="threads" if threads else "lockstep", rt_priority=0,
+                                max_bodies=16, max_contacts=64)
         device = hapode.Device("virtual:sine=0.1/0/0.05,hz=3") if random.random() < 0.5 else None
         pointer = session.add_pointer(device or "virtual:path=0:0/0/0.1")
         made += [session, pointer, device]
