@@ -18,6 +18,8 @@
 
 /* ---- a codec that lies ---- */
 
+#define BODIES_LIED 8 /* what a client has room for */
+
 typedef enum lie {
   LIE_NONE,
   LIE_IMPULSE,
@@ -70,7 +72,7 @@ static void body_lie(liar *l, hapi_state *state, hapi_state_body *io)
 static void others_lie(hapi_state *state, uint32_t slot)
 {
   hapi_state_body *body = &hapi_state_bodies(state)[slot];
-  state->body_high = 8;
+  state->body_high = BODIES_LIED;
   if (body->generation == 0) {
     *body = (hapi_state_body){.generation = 1,
                               .flags = HAPI_BODY_OWNED,
@@ -85,11 +87,15 @@ static hap_status liar_send(void *self, void *const messages[2], const hapi_code
 {
   liar *l = self;
   hapi_state *state = messages[0];
+  hapi_state_body truth[BODIES_LIED]; /* the loop goes on with its own */
+  const uint32_t high = state->body_high;
+  REQUIRE(high <= BODIES_LIED);
+  memcpy(truth, hapi_state_bodies(state), sizeof truth);
   l->growth = l->kind == LIE_GROWTH   ? fmax(1.1 * l->growth, 0.1)
               : l->kind == LIE_ENERGY ? sqrt(l->growth * l->growth + 2.0 * 40.0 / CUBE)
                                       : 0.0;
   l->shoves += l->kind == LIE_SHOVES ? 20.0 : 0.0;
-  for (uint32_t i = 0; l->kind == LIE_OTHERS && i < 8; ++i) {
+  for (uint32_t i = 0; l->kind == LIE_OTHERS && i < BODIES_LIED; ++i) {
     others_lie(state, i);
   }
   for (uint32_t i = 0; i < state->body_high && l->kind < LIE_OTHERS && l->kind != LIE_NONE; ++i) {
@@ -97,7 +103,10 @@ static hap_status liar_send(void *self, void *const messages[2], const hapi_code
       body_lie(l, state, &hapi_state_bodies(state)[i]);
     }
   }
-  return l->inner.send(l->inner.self, messages, out, detail);
+  hap_status status = l->inner.send(l->inner.self, messages, out, detail);
+  memcpy(hapi_state_bodies(state), truth, sizeof truth);
+  state->body_high = high;
+  return status;
 }
 
 static hap_status liar_take(void *self, const hap_link_event *event, hap_detail *detail)

@@ -86,13 +86,14 @@ typedef struct hapi_local_body {
   uint32_t generation;
   uint32_t flags;
   uint32_t epoch;
-  uint32_t row; /* place in the solver's velocities */
-  bool live;    /* in the model in use */
-  bool pushed;  /* since it was adopted */
-  bool round;   /* the same inertia about all axes: it does not turn with them */
-  bool forced;  /* the application pushes it */
-  bool rowed;   /* scratch: it has a row in this tick */
-  bool waiting; /* for its first contacts: goes on with its twist until they are known */
+  uint32_t row;       /* place in the solver's velocities */
+  bool live;          /* in the model in use */
+  bool pushed;        /* since it was adopted */
+  bool round;         /* the same inertia about all axes: it does not turn with them */
+  bool forced;        /* the application pushes it */
+  bool rowed;         /* scratch: it has a row in this tick */
+  bool waiting;       /* for its first contacts: goes on with its twist until they are known */
+  uint64_t left_tick; /* not live: since this tick, and nothing of it has changed since */
   hap_pose pose;
   hap_twist twist;
   hapi_body_account account;

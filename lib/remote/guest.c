@@ -121,7 +121,9 @@ void hapi_guest_take(hapi_guest *guest, int64_t now_ns, hapi_state *state, size_
     guest->model_number = state->model_number;
     guest->model_ns = now_ns;
   }
-  memcpy(guest->state, state, size);
+  if (state != guest->state) {
+    memcpy(guest->state, state, size);
+  }
   guest->has_state = guest->fresh = true;
 }
 

@@ -55,6 +55,17 @@ static void state_shift(hapi_loop_end *loop, int64_t offset_ns, hapi_state *io)
   }
 }
 
+/* As the loop has it: what it has told, it tells no more where it stays. */
+static void state_shift_back(const hapi_loop_end *loop, hapi_state *io)
+{
+  for (uint32_t i = 0; i < io->body_high; ++i) {
+    hapi_state_body *body = &hapi_state_bodies(io)[i];
+    if (body->owned_until_ns != 0) {
+      body->owned_until_ns = loop->left[i].until_ns;
+    }
+  }
+}
+
 /* ---- in ---- */
 
 static void told_hear(hapi_loop_end *loop, const hap_link_event *event)
@@ -197,10 +208,14 @@ void hapi_loop_end_send(hapi_loop_end *loop, int64_t now_ns)
   }
   int64_t trip_ns;
   hapi_hands_hide(&loop->hands, state);
-  if (loop->stamps.count > 0) { /* before, no body is the loop's, and hands can be told already */
+  bool shifts = loop->stamps.count > 0; /* before, no body is the loop's, and hands can be told */
+  if (shifts) {
     state_shift(loop, hapi_stamps_offset(&loop->stamps, &trip_ns), state);
   }
   hapi_end_send(&loop->end, messages);
+  if (shifts) {
+    state_shift_back(loop, state);
+  }
   int64_t period_ns = llround(1e9 * loop->terms.period_s);
   loop->next_ns += period_ns;
   loop->next_ns = loop->next_ns <= now_ns ? now_ns + period_ns : loop->next_ns;

@@ -363,8 +363,10 @@ static void loop_take(hapi_world_end *world)
   }
   hapi_guest *guest = &world->guests[world->shares.loop];
   size_t size = hapi_exchange_message_size(world->exchange, HAPI_CHANNEL_STATE);
-  hapi_guest_own(guest, state);
-  hapi_guest_take(guest, world->end.now_ns, state, size, world->shares.of, world->shares.loop);
+  memcpy(guest->state, state, size); /* the loop's own stays as it is */
+  hapi_guest_own(guest, guest->state);
+  hapi_guest_take(guest, world->end.now_ns, guest->state, size, world->shares.of,
+                  world->shares.loop);
 }
 
 static void guests_merge(hapi_world_end *world)

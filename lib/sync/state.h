@@ -29,6 +29,8 @@ typedef struct hapi_state_pointer {
   uint64_t held; /* birth of the body that it holds or is to hold; 0: none */
 } hapi_state_pointer;
 
+/* Of a body that has left the model the loop writes it once into each message: who takes a message
+ * leaves its bodies as they are. */
 typedef struct hapi_state_body {
   uint32_t generation; /* 0: slot never used */
   uint32_t flags;      /* HAPI_BODY_RESTING while nothing has pushed it */

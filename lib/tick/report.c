@@ -4,13 +4,41 @@
 
 #include <string.h>
 
+#include "base/assert.h"
 #include "base/hash.h"
 #include "base/pointer_id.h"
 #include "base/vec.h"
 #include "pointer/coupling.h"
 #include "pointer/own_force.h"
 
-static void report_bodies(const hapi_bodies *from, hapi_state *out)
+static void report_body(const hapi_local_body *in, hapi_state_body *out)
+{
+  out->generation = in->generation;
+  out->flags = in->flags;
+  out->epoch = in->epoch;
+  out->pose = in->pose;
+  out->twist = in->twist;
+  hapi_v3_copy(in->account.impulse, out->impulse);
+  hapi_v3_copy(in->account.angular_impulse, out->angular_impulse);
+  memcpy(out->residual, in->account.residual_taken, sizeof out->residual);
+  memcpy(out->gain, in->account.gain, sizeof out->gain);
+  out->owned_until_ns = in->owned_until_ns;
+  if (in->owned_until_ns != 0) {
+    out->owned_pose = in->left.pose;
+    out->owned_twist = in->left.twist;
+  }
+}
+
+/* For an assert. */
+static inline bool report_is_of(const hapi_local_body *in, const hapi_state_body *told)
+{
+  hapi_state_body again = *told;
+  report_body(in, &again);
+  return memcmp(&again, told, sizeof again) == 0;
+}
+
+/* written: the tick of which the message tells as yet; it has what left before. */
+static void report_bodies(const hapi_bodies *from, uint64_t written, hapi_state *out)
 {
   hapi_state_body *bodies = hapi_state_bodies(out);
   for (uint32_t i = 0; i < from->high; ++i) {
@@ -19,21 +47,10 @@ static void report_bodies(const hapi_bodies *from, hapi_state *out)
       if (bodies[i].generation != 0) {
         memset(&bodies[i], 0, sizeof bodies[i]);
       }
-      continue;
-    }
-    bodies[i].generation = in->generation;
-    bodies[i].flags = in->flags;
-    bodies[i].epoch = in->epoch;
-    bodies[i].pose = in->pose;
-    bodies[i].twist = in->twist;
-    hapi_v3_copy(in->account.impulse, bodies[i].impulse);
-    hapi_v3_copy(in->account.angular_impulse, bodies[i].angular_impulse);
-    memcpy(bodies[i].residual, in->account.residual_taken, sizeof bodies[i].residual);
-    memcpy(bodies[i].gain, in->account.gain, sizeof bodies[i].gain);
-    bodies[i].owned_until_ns = in->owned_until_ns;
-    if (in->owned_until_ns != 0) {
-      bodies[i].owned_pose = in->left.pose;
-      bodies[i].owned_twist = in->left.twist;
+    } else if (in->live || written < in->left_tick || in->left_tick == 0) {
+      report_body(in, &bodies[i]);
+    } else {
+      HAPI_ASSERT(report_is_of(in, &bodies[i]));
     }
   }
   out->body_high = from->high;
@@ -192,7 +209,7 @@ void hapi_tick_report(const hapi_tick *tick, hapi_state *out)
   out->time_scale = tick->facts.time_scale;
   out->model_number = tick->facts.model_number;
   out->model = tick->facts.model;
-  report_bodies(&tick->bodies, out);
+  report_bodies(&tick->bodies, out->tick, out);
   report_contacts(&tick->touches, &tick->pointers, &tick->bodies, out);
   report_springs(&tick->touches, tick->facts.tick, out);
   report_joints(&tick->joints, out);
