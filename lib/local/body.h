@@ -14,6 +14,7 @@
 
 /* Totals that physics is told. */
 typedef struct hapi_body_account {
+  uint64_t left_tick; /* not live: since this tick, and nothing of the body has changed since */
   double impulse[3];
   double angular_impulse[3];
   double residual_taken[6]; /* of eq. 14, what has been added so far */
@@ -86,14 +87,13 @@ typedef struct hapi_local_body {
   uint32_t generation;
   uint32_t flags;
   uint32_t epoch;
-  uint32_t row;       /* place in the solver's velocities */
-  bool live;          /* in the model in use */
-  bool pushed;        /* since it was adopted */
-  bool round;         /* the same inertia about all axes: it does not turn with them */
-  bool forced;        /* the application pushes it */
-  bool rowed;         /* scratch: it has a row in this tick */
-  bool waiting;       /* for its first contacts: goes on with its twist until they are known */
-  uint64_t left_tick; /* not live: since this tick, and nothing of it has changed since */
+  uint32_t row; /* place in the solver's velocities */
+  bool live;    /* in the model in use */
+  bool pushed;  /* since it was adopted */
+  bool round;   /* the same inertia about all axes: it does not turn with them */
+  bool forced;  /* the application pushes it */
+  bool rowed;   /* scratch: it has a row in this tick */
+  bool waiting; /* for its first contacts: goes on with its twist until they are known */
   hap_pose pose;
   hap_twist twist;
   hapi_body_account account;

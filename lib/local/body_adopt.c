@@ -229,7 +229,7 @@ static void bodies_leave(const hapi_bodies *bodies, hapi_model *model,
   for (uint32_t i = 0; i < bodies->live_count; ++i) {
     hapi_local_body *body = &bodies->of[bodies->live[i]];
     if (!body->live) {
-      body->left_tick = before->tick + 1;
+      body->account.left_tick = before->tick + 1;
       hapi_stay_end(body);
       body_disown(body, before);
     }

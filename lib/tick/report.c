@@ -47,7 +47,7 @@ static void report_bodies(const hapi_bodies *from, uint64_t written, hapi_state 
       if (bodies[i].generation != 0) {
         memset(&bodies[i], 0, sizeof bodies[i]);
       }
-    } else if (in->live || written < in->left_tick || in->left_tick == 0) {
+    } else if (in->live || written < in->account.left_tick || in->account.left_tick == 0) {
       report_body(in, &bodies[i]);
     } else {
       HAPI_ASSERT(report_is_of(in, &bodies[i]));
