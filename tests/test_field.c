@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include "base/hash.h"
 #include "tests/contact_world.h"
 #include "tests/solids.h"
 
@@ -172,6 +173,93 @@ TEST(a_crate_on_a_field_is_that_on_the_same_triangles)
     CHECK_NEAR(field.largest, mesh.largest, 0.01 * mesh.largest);
     CHECK(mesh.largest <= mesh.bound);
   }
+}
+
+/* ---- steep ground: no contact may be missing that holds a body ---- */
+
+#define ROUGH_CELLS 12
+#define ROUGH_CELL 0.02
+#define CRATE_HALF    \
+  {                   \
+    0.03, 0.025, 0.02 \
+  }
+
+static uint64_t ground_seed;
+
+/* Up to 8 mm up or down: slopes of up to 45 degrees and more. */
+static double steep_height(int i, int k)
+{
+  uint64_t bits = hapi_hash_word(hapi_hash_word(ground_seed, (uint64_t)i), (uint64_t)k);
+  return 0.008 * (2.0 * (double)(bits >> 11) / 9007199254740992.0 - 1.0);
+}
+
+/* m, of the ground's triangles: see grid_mesh. */
+static double ground_height(const grid *g, double x, double y)
+{
+  double u = x / g->cell + 0.5 * g->cells;
+  double v = 0.5 * g->cells - y / g->cell;
+  int i = (int)fmin(fmax(u, 0.0), g->cells - 1.0);
+  int k = (int)fmin(fmax(v, 0.0), g->cells - 1.0);
+  const double *a = &g->heights[k * (g->cells + 1) + i];
+  const double *b = a + g->cells + 1;
+  u -= i;
+  v -= k;
+  return u + v <= 1.0 ? a[0] + u * (a[1] - a[0]) + v * (b[0] - a[0])
+                      : b[1] + (1.0 - u) * (b[0] - b[1]) + (1.0 - v) * (a[1] - b[1]);
+}
+
+/* m, how deep the crate's corners are in the ground, and the ground's corners in the crate. */
+static double crate_sinks(const grid *g, dBodyID crate)
+{
+  static const double half[3] = CRATE_HALF;
+  double deepest = 0.0;
+  for (int n = 0; n < 8; ++n) {
+    dVector3 at;
+    dBodyGetRelPointPos(crate, (n & 1) != 0 ? half[0] : -half[0], (n & 2) != 0 ? half[1] : -half[1],
+                        (n & 4) != 0 ? half[2] : -half[2], at);
+    deepest = fmax(deepest, ground_height(g, at[0], at[1]) - at[2]);
+  }
+  for (int n = 0; n < (g->cells + 1) * (g->cells + 1); ++n) {
+    dVector3 in;
+    double x = g->cell * (n % (g->cells + 1) - 0.5 * g->cells);
+    double y = g->cell * (0.5 * g->cells - n / (g->cells + 1));
+    dBodyGetPosRelPoint(crate, x, y, g->heights[n], in);
+    double depth = fmin(fmin(half[0] - fabs(in[0]), half[1] - fabs(in[1])), half[2] - fabs(in[2]));
+    deepest = fmax(deepest, depth);
+  }
+  return deepest;
+}
+
+TEST(a_crate_does_not_sink_into_steep_ground)
+{
+  static grid ground;
+  double deepest = 0.0;
+  for (ground_seed = 1; ground_seed <= 24; ++ground_seed) {
+    contact_world *w = cw_new(CW_GRAVITY);
+    w->def.physics_hz = 60.0;
+    w->def.max_contacts = 2048;
+    w->expert.max_hull_points = 20000;
+    dBodyID crate = cw_add_box(w, MASS, (const double[3]){0.06, 0.05, 0.04}, -0.03, 0.004, 0.035);
+    grid_fill(&ground, ROUGH_CELLS, ROUGH_CELL, steep_height);
+    if (ground_seed % 2 == 0) {
+      grid_field(w->space, &ground);
+    } else {
+      grid_mesh(w->space, &ground);
+    }
+    cw_start(w, -0.075, 0.004, 0.04);
+    cw_run(w, 300);
+    cw_move_hand(w, SPEED, 0.0, 0.0);
+    double own = 0.0;
+    for (int i = 0; i < 500; ++i) {
+      cw_tick(w);
+      own = fmax(own, i > 50 ? crate_sinks(&ground, crate) : 0.0);
+    }
+    CHECK_SAY(own < 1e-3, "ground %d: %g m", (int)ground_seed, own);
+    CHECK(cw_stats(w).model.range_bodies == 1);
+    deepest = fmax(deepest, own);
+    cw_close(w);
+  }
+  printf("# %g m deep at most\n", deepest);
 }
 
 static double tile_heights[16];

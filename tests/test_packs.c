@@ -186,19 +186,25 @@ static void rows_ready(problem *p, contact_ready contact, row_ready other)
   }
 }
 
+/* What the impulses of all rows make of the free velocities. */
+static void velocities_make(const problem *p, double (*out)[6])
+{
+  memcpy(out, p->free_v, BODIES * sizeof *out);
+  for (uint32_t i = 0; i < p->solver.row_count; ++i) {
+    const hapi_row *row = &p->rows[i];
+    for (int k = 0; k < 6; ++k) {
+      out[row->a][k] += row->impulse * row->ba[k];
+      out[row->b][k] += row->impulse * row->bb[k];
+    }
+  }
+}
+
 /* m/s, by how much the impulses miss what the rows ask for. */
 static double rows_miss(const problem *p)
 {
   static double v[BODIES][6];
   double most = 0.0;
-  memcpy(v, p->free_v, sizeof v);
-  for (uint32_t i = 0; i < p->solver.row_count; ++i) {
-    const hapi_row *row = &p->rows[i];
-    for (int k = 0; k < 6; ++k) {
-      v[row->a][k] += row->impulse * row->ba[k];
-      v[row->b][k] += row->impulse * row->bb[k];
-    }
-  }
+  velocities_make(p, v);
   for (uint32_t i = 0; i < p->solver.row_count; ++i) {
     const hapi_row *row = &p->rows[i];
     double load = row->normal < 0 ? 0.0 : p->rows[row->normal].impulse;
@@ -239,15 +245,8 @@ static double energy_beyond(const problem *p, double *out_apart)
 {
   static double v[BODIES][6];
   double energy = 0.0;
-  memcpy(v, p->free_v, sizeof v);
   *out_apart = 0.0;
-  for (uint32_t i = 0; i < p->solver.row_count; ++i) {
-    const hapi_row *row = &p->rows[i];
-    for (int k = 0; k < 6; ++k) {
-      v[row->a][k] += row->impulse * row->ba[k];
-      v[row->b][k] += row->impulse * row->bb[k];
-    }
-  }
+  velocities_make(p, v);
   for (uint32_t i = 0; i < p->solver.row_count; ++i) {
     const hapi_row *row = &p->rows[i];
     double before =

@@ -17,6 +17,7 @@
 #define CHUNK 32u
 #define SAMPLES 16u /* of a mesh, looked at in every walk */
 #define FOUND_MAX HAPI_NEAR_TRIANGLES
+#define FAN_MOST 64u /* triangles around a corner */
 
 static void destroy_mesh(hapi_mesh *mesh)
 {
@@ -234,11 +235,25 @@ static void meet_corner(hapi_meshes *meshes, uint32_t corner)
   meshes->places[at] = corner + 1;
 }
 
-/* The least cosine between a triangle and those that share a corner of the chain with it. */
+static uint32_t chain_length(const hapi_meshes *meshes, uint32_t first)
+{
+  uint32_t length = 0;
+  for (uint32_t i = first; i != 0; i = meshes->next_corner[i - 1]) {
+    ++length;
+  }
+  return length;
+}
+
+/* The least cosine between a triangle and those that share a corner of the chain with it. Around
+ * the middle of a large fan contacts may lean by any angle: its pairs would take milliseconds. */
 static void lean_of_chain(const hapi_meshes *meshes, uint32_t first, double (*normals)[3],
                           double *io_cosines)
 {
-  for (uint32_t i = first; i != 0; i = meshes->next_corner[i - 1]) {
+  bool large = chain_length(meshes, first) > FAN_MOST;
+  for (uint32_t i = first; large && i != 0; i = meshes->next_corner[i - 1]) {
+    io_cosines[(i - 1) / 3] = 0.0;
+  }
+  for (uint32_t i = first; !large && i != 0; i = meshes->next_corner[i - 1]) {
     for (uint32_t k = first; k != 0; k = meshes->next_corner[k - 1]) {
       double *least = &io_cosines[(i - 1) / 3];
       *least = fmin(*least, hapi_v3_dot(normals[(i - 1) / 3], normals[(k - 1) / 3]));

@@ -19,8 +19,8 @@
 
 #define BEHIND_SINE 1e-3   /* 0.06 degrees */
 #define FLAT_COSINE 0.9962 /* 5 degrees, as of patches of two faces */
-#define FLAT_ANGLE 0.0873
-#define LEAN_STEPS 255.0 /* of a right angle */
+#define FLAT_ANGLE 0.0873  /* rad, the same */
+#define LEAN_STEPS 255.0   /* of a right angle */
 
 uint32_t hapi_mesh_lean(double cosine)
 {

@@ -8,9 +8,9 @@
 
 #include "proximity/patch.h"
 
-#define HAPI_TRIANGLE_SOLID 16u /* of open_edges: nothing touches it from behind */
-#define HAPI_TRIANGLE_LEAN 8    /* of open_edges, from this bit on: see hapi_mesh_lean */
-#define HAPI_TRIANGLE_BITS 0xff1fu
+#define HAPI_TRIANGLE_SOLID 16u    /* of open_edges: nothing touches it from behind */
+#define HAPI_TRIANGLE_LEAN 8       /* of open_edges, from this bit on: see hapi_mesh_lean */
+#define HAPI_TRIANGLE_BITS 0xff1fu /* all that open_edges may have */
 
 /* For open_edges: contacts may lean away from a triangle's normal, to either side, by no more than
  * an angle of this cosine, rounded up. 0 and less: any. */
