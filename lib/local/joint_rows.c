@@ -35,7 +35,8 @@ enum {
   PART_TURN = 3,
   PART_GIVEN = 6,
   PART_AXIS = 7, /* PARTS_OF_AXIS for each: motor, low stop, high stop, spring */
-  PARTS_OF_AXIS = 4
+  PARTS_OF_AXIS = 4,
+  OF_AXIS_SPRING = 3
 };
 
 typedef struct placed_joint {
@@ -53,6 +54,7 @@ typedef struct placed_joint {
   double turned[3]; /* the second body in the first, from where place.turn has it; small */
   bool driven;      /* a body of given motion takes part */
   double was[HAPI_JOINT_PARTS];
+  double slip[HAPI_JOINT_LIMITS];
 } placed_joint;
 
 /* ---- what turns ---- */
@@ -494,9 +496,9 @@ static void add_spring(hapi_rows *rows, double period, const placed_joint *j, in
                        double position)
 {
   double cfm;
-  hapi_row *row = axis_row(rows, j, which, 3, 1.0);
+  hapi_row *row = axis_row(rows, j, which, OF_AXIS_SPRING, 1.0);
   if (row != NULL) {
-    const hapi_axis_state at = {position, speed_of(j, row),
+    const hapi_axis_state at = {position, speed_of(j, row) + j->slip[which],
                                 hapi_dot6(row->ja, row->ba) + hapi_dot6(row->jb, row->bb)};
     hapi_axis_spring_row(&j->in->limits[which].spring, period, &at, &row->target, &cfm);
     newest_source(rows)->gives = true;
@@ -722,12 +724,37 @@ void hapi_joint_rows(hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *
   for (uint32_t i = 0; i < joints->count; ++i) {
     placed_joint j;
     if (find_joint(joints, bodies, i, &j) && (hapi_body_responds(j.a) || hapi_body_responds(j.b))) {
-      double *impulse = joints->memory[j.in->slot].impulse;
-      memcpy(j.was, impulse, sizeof j.was);
-      memset(impulse, 0, sizeof j.was); /* what has a row now is written when it is solved */
+      hapi_joint_memory *memory = &joints->memory[j.in->slot];
+      memcpy(j.was, memory->impulse, sizeof j.was);
+      memcpy(j.slip, memory->slip, sizeof j.slip);
+      /* what has a row now is written when it is solved */
+      memset(memory->impulse, 0, sizeof memory->impulse);
+      memset(memory->slip, 0, sizeof memory->slip);
       joint_place(&j);
       add_joint(rows, facts, &j);
     }
+  }
+}
+
+/* ---- after the solve ---- */
+
+/* A rotor turns as its row says, and its axis as the solver left it. Where rows are left unsolved
+ * the two differ, and a rotor that were as fast as its axis would have energy from nowhere: a light
+ * body that a hard contact turns would take a heavy rotor along. */
+void hapi_joint_keep(const hapi_joints *joints, const hapi_rows *rows, uint32_t row)
+{
+  const hapi_solver *solver = &rows->solver;
+  const hapi_row_source *source = &rows->sources[row];
+  HAPI_ASSERT(source->joint);
+  HAPI_ASSERT_INDEX(source->contact, joints->count);
+  HAPI_ASSERT_INDEX(source->part, HAPI_JOINT_PARTS);
+  hapi_joint_memory *memory = &joints->memory[joints->of[source->contact].slot];
+  memory->impulse[source->part] = solver->rows[row].impulse;
+  int of_axis = source->part - PART_AXIS;
+  if (of_axis >= 0 && of_axis % PARTS_OF_AXIS == OF_AXIS_SPRING &&
+      solver->residual >= HAPI_UNSOLVED) {
+    double slip = hapi_row_error(solver, &solver->rows[row]);
+    memory->slip[of_axis / PARTS_OF_AXIS] = isfinite(slip) ? slip : 0.0;
   }
 }
 

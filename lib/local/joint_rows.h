@@ -18,6 +18,7 @@ typedef struct hapi_joint_memory {
   uint32_t measurement;             /* whose rows the impulses are of */
   bool tells;                       /* in this tick, to given */
   double impulse[HAPI_JOINT_PARTS]; /* N s, N m s, of the last tick */
+  double slip[HAPI_JOINT_LIMITS]; /* rad/s, m/s: rotors, as it left them, faster than their axes */
   hapi_joint_given given;
 } hapi_joint_memory;
 
@@ -36,6 +37,9 @@ void hapi_joint_wake(const hapi_joints *joints, const hapi_bodies *bodies, hapi_
 
 void hapi_joint_rows(hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *rows,
                      const hapi_tick_facts *facts);
+
+/* After the solve, of the row of a joint. */
+void hapi_joint_keep(const hapi_joints *joints, const hapi_rows *rows, uint32_t row);
 
 /* After the solve: adds to what physics is told of joints. */
 void hapi_joints_tell(const hapi_joints *joints, const hapi_bodies *bodies, const hapi_rows *rows,

@@ -388,9 +388,7 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
       }
       continue;
     }
-    HAPI_ASSERT_INDEX(source->contact, joints->count);
-    HAPI_ASSERT_INDEX(source->part, HAPI_JOINT_PARTS);
-    joints->memory[joints->of[source->contact].slot].impulse[source->part] = row->impulse;
+    hapi_joint_keep(joints, rows, i - 1);
     if (row->impulse == 0.0) {
       continue;
     }
