@@ -7,6 +7,7 @@
 #include "tests/tap.h"
 
 #include "base/hash.h"
+#include "sync/mesh_filter.h"
 #include "tests/contact_world.h"
 #include "tests/solids.h"
 
@@ -260,6 +261,83 @@ TEST(a_crate_does_not_sink_into_steep_ground)
     cw_close(w);
   }
   printf("# %g m deep at most\n", deepest);
+}
+
+/* ---- the border of a sheet ---- */
+
+static double sheet_height(int i, int k)
+{
+  (void)i;
+  (void)k;
+  return 0.021;
+}
+
+/* m: how far a crate that a hand pushes gets over the border of an open mesh without thickness, as
+ * high as the middle of its side. */
+static double crate_gets_beyond(double yaw)
+{
+  static grid sheet;
+  const double size[3] = {0.06, 0.05, 0.04};
+  const double border = -0.5 * ROUGH_CELLS * ROUGH_CELL;
+  dMatrix3 turned;
+  double farthest = -HUGE_VAL;
+  contact_world *w = cw_new(CW_GRAVITY);
+  dCreatePlane(w->space, 0.0, 0.0, 1.0, 0.0);
+  dBodyID crate = cw_add_box(w, MASS, size, border - 0.045, 0.004, 0.02);
+  dRFromAxisAndAngle(turned, 0.0, 0.0, 1.0, yaw);
+  dBodySetRotation(crate, turned);
+  grid_fill(&sheet, ROUGH_CELLS, ROUGH_CELL, sheet_height);
+  grid_mesh(w->space, &sheet);
+  cw_start(w, border - 0.1, 0.004, 0.02);
+  cw_run(w, 100);
+  cw_move_hand(w, SPEED, 0.0, 0.0);
+  for (int i = 0; i < 500; ++i) {
+    cw_tick(w);
+    for (int n = 0; n < 8; ++n) {
+      dVector3 at;
+      dBodyGetRelPointPos(crate, (n & 1) != 0 ? 0.03 : -0.03, (n & 2) != 0 ? 0.025 : -0.025,
+                          (n & 4) != 0 ? 0.02 : -0.02, at);
+      farthest = fmax(farthest, at[0] - border);
+    }
+  }
+  cw_close(w);
+  return farthest;
+}
+
+TEST(a_crate_does_not_go_through_the_border_of_a_sheet)
+{
+  for (int i = 0; i <= 6; ++i) {
+    double beyond = crate_gets_beyond(0.25 * i);
+    printf("# yaw %.2f: %g m beyond the border\n", 0.25 * i, beyond);
+    CHECK(beyond > -1e-3 && beyond < 1e-3);
+  }
+}
+
+/* Over which of a triangle's edges a normal in its plane may lean: an open one, also a little past
+ * its end; no closed one, and not between two such at a sharp tip. */
+TEST(a_normal_leans_over_open_edges)
+{
+  static const double even[9] = {0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+  static const double sharp[9] = {0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.05, 0.0}; /* tip at 0 */
+  static const struct {
+    const double *corners;
+    uint32_t open; /* edges */
+    double angle;  /* of the normal in the plane, from x, rad */
+    bool allowed;
+  } rows[] = {
+      {even, 1u, -0.5 * M_PI, true},         {even, 1u, -0.5 * M_PI - 0.08, true},
+      {even, 1u, -0.5 * M_PI - 0.1, false},  {even, 1u, -0.5 * M_PI + 0.3, true},
+      {even, 1u, -0.25 * M_PI + 0.2, false}, {even, 3u, -0.25 * M_PI + 0.2, true},
+      {even, 2u, -0.5 * M_PI, false},        {even, 0u, 0.25 * M_PI, false},
+      {sharp, 5u, M_PI - 0.025, true},       {sharp, 2u, M_PI - 0.025, false},
+      {sharp, 7u, M_PI - 0.025, true},       {sharp, 0u, M_PI - 0.025, false},
+  };
+  for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i) {
+    const double normal[3] = {cos(rows[i].angle), sin(rows[i].angle), 0.0};
+    uint32_t edges = hapi_mesh_lean(0.0) | 8u | rows[i].open;
+    CHECK_SAY(hapi_mesh_allows(edges, rows[i].corners, normal) == rows[i].allowed, "row %d",
+              (int)i);
+  }
 }
 
 static double tile_heights[16];

@@ -20,7 +20,9 @@
 #define BEHIND_SINE 1e-3   /* 0.06 degrees */
 #define FLAT_COSINE 0.9962 /* 5 degrees, as of patches of two faces */
 #define FLAT_ANGLE 0.0873  /* rad, the same */
-#define LEAN_STEPS 255.0   /* of a right angle */
+#define FLAT_SINE 0.0872
+#define ROUNDING 1e-9
+#define LEAN_STEPS 255.0 /* of a right angle */
 
 uint32_t hapi_mesh_lean(double cosine)
 {
@@ -57,6 +59,25 @@ void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
   hapi_v3_copy(corners, io->core_b);
 }
 
+/* How the part of the normal in the triangle's plane lies. The side of a box that lies along an
+ * open edge is flat on it up to 5 degrees, and leans as much over the closed edge beside it. */
+static bool leans_over_open(uint32_t open_edges, double sides[3][3], const double own[3],
+                            const double normal[3])
+{
+  double over[2] = {0.0, 0.0}; /* closed edges, open ones: sines */
+  double across[3];
+  hapi_v3_cross(own, normal, across); /* as long as that part, times the area */
+  for (int i = 0; i < 3; ++i) {
+    double outward[3];
+    hapi_v3_cross(sides[i], own, outward);
+    double sine = hapi_v3_dot(outward, normal) * hapi_v3_norm(own) /
+                  (hapi_v3_norm(outward) * hapi_v3_norm(across));
+    double *most = &over[open_edges >> i & 1];
+    *most = hapi_max(*most, sine);
+  }
+  return over[0] <= ROUNDING || (over[0] <= FLAT_SINE && over[1] > over[0]);
+}
+
 bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double normal[3])
 {
   HAPI_ASSERT_UNIT(normal);
@@ -81,13 +102,5 @@ bool hapi_mesh_allows(uint32_t open_edges, const double *corners, const double n
   if (leans_too_far(open_edges, fabs(lean))) {
     return false;
   }
-  for (int i = 0; i < 3; ++i) {
-    double outward[3];
-    hapi_v3_cross(sides[i], own, outward);
-    bool over = hapi_v3_dot(outward, normal) > 1e-9 * hapi_v3_norm(outward);
-    if (over && (open_edges & (1u << i)) == 0) {
-      return false;
-    }
-  }
-  return true;
+  return leans_over_open(open_edges, sides, own, normal);
 }
