@@ -35,7 +35,11 @@ static rig *open_rig(hap_drive drive, hap_model model, int threads)
   parameters.gap = 0.05;
   options.parameters = &parameters;
   options.count = CUBES;
-  options.devices[0] = "virtual:path=0:-0.012/0/0.025;0.5:0.02/0/0.025,hand=rigid";
+  /* Frames run as fast as they can, and the hand in real time: slow enough that however late they
+   * are the first cube does not come to the next one. */
+  options.devices[0] = drive == HAP_DRIVE_FRAME
+                           ? "virtual:path=0:-0.012/0/0.025;10:0.02/0/0.025,hand=rigid"
+                           : "virtual:path=0:-0.012/0/0.025;0.5:0.02/0/0.025,hand=rigid";
   options.device_count = 1;
   options.island_threads = threads;
   options.def.drive = drive;
