@@ -35,6 +35,7 @@ typedef struct problem {
   hapi_pack_block blocks[HAPI_PACK_BLOCKS(PACKS)];
   double impulse[PACKS][3][HAPI_LANES];
   hapi_packable packables[HAPI_LANES * PACKS];
+  hapi_pack_news news[HAPI_LANES * PACKS];
   hapi_pack_unit units[HAPI_LANES * PACKS];
   uint32_t order[HAPI_LANES * PACKS];
   uint32_t sorted[HAPI_LANES * PACKS];
@@ -60,6 +61,7 @@ static inline void problem_link(problem *p, const hapi_pack_work *work)
   p->solver.packs.blocks = p->blocks;
   p->solver.packs.impulse = p->impulse;
   p->solver.packs.packables = p->packables;
+  p->solver.packs.news = p->news;
   p->solver.packs.units = p->units;
   p->solver.packs.plan.order = p->order;
   p->solver.packs.plan.sorted = p->sorted;

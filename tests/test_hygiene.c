@@ -218,6 +218,7 @@ static void check_damage(const damage *d, double bad, hap_model model, bool runn
   world_close(&t.w);
 }
 
+/* While it runs in two of the four models each: all numbers and all models of every damage. */
 TEST(nothing_that_is_no_number_reaches_the_world)
 {
   for (size_t i = 0; i < COUNT(damages); ++i) {
@@ -226,7 +227,7 @@ TEST(nothing_that_is_no_number_reaches_the_world)
         continue;
       }
       check_damage(&damages[i], bad_numbers[k], HAP_MODEL_ACCELERANCE, false);
-      for (int model = 0; model <= HAP_MODEL_CONTACT; ++model) {
+      for (int model = (int)(i + k) % 2; model <= HAP_MODEL_CONTACT; model += 2) {
         check_damage(&damages[i], bad_numbers[k], (hap_model)model, true);
       }
     }

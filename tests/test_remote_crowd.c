@@ -225,7 +225,7 @@ static double seconds_now(clockid_t clock)
 
 TEST(sixteen_hands_have_a_world_at_its_rate_or_are_told)
 {
-  double seconds = strcmp(tap_argument, "long") == 0 ? 600.0 : 20.0;
+  double seconds = strcmp(tap_argument, "long") == 0 ? 600.0 : 8.0;
   crowd *c = tap_own(sizeof *c, crowd_finish);
   crowd_side *server = &c->sides[HANDS];
   c->wires[HANDS].count = HANDS;

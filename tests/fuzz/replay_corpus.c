@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Runs a fuzzer on every file of a folder, whole and cut off at every byte: what fuzzing has found
- * once is tested wherever the tests run, without libFuzzer. An input that fails ends the program;
- * the last line with a '#' tells which it was. */
+/* Runs a fuzzer on every file of a folder, whole and cut off at every byte, or at each so manyth
+ * one: what fuzzing has found once is tested wherever the tests run, without libFuzzer. An input that
+ * fails ends the program; the last line with a '#' tells which it was. */
 
 #include "tests/tap.h"
 
@@ -15,6 +15,7 @@
 #define FILE_MAX 65536
 
 static const char *folder;
+static long cut_step = 1; /* bytes */
 
 /* Fills data; the size, or -1 when it is no file that can be read whole. */
 static long read_file(const char *name, uint8_t *data)
@@ -55,7 +56,8 @@ static int run_files(bool cut)
       CHECK(size >= 0);
       printf("# %s%s\n", names[i]->d_name, cut ? ", cut off" : "");
       fflush(stdout);
-      for (long length = cut ? 0 : size; length <= size; ++length) {
+      /* from file to file at other places */
+      for (long length = cut ? i % cut_step : size; length <= size; length += cut_step) {
         input_run(data, (size_t)length);
       }
       ++files;
@@ -71,20 +73,21 @@ TEST(every_file_of_the_corpus)
   CHECK(run_files(false) > 0);
 }
 
-TEST(every_file_cut_off_at_every_byte)
+TEST(every_file_cut_off)
 {
   CHECK(run_files(true) > 0);
 }
 
 int main(int argc, char **argv)
 {
-  if (argc != 2) {
-    fprintf(stderr, "usage: %s CORPUS_FOLDER\n", argv[0]);
+  folder = argc > 1 ? argv[1] : NULL;
+  cut_step = argc > 2 ? strtol(argv[2], NULL, 10) : 1;
+  if (folder == NULL || argc > 3 || cut_step < 1) {
+    fprintf(stderr, "usage: %s CORPUS_FOLDER [BYTES]\n", argv[0]);
     return 2;
   }
-  folder = argv[1];
   fuzz_start();
   RUN(every_file_of_the_corpus);
-  RUN(every_file_cut_off_at_every_byte);
+  RUN(every_file_cut_off);
   return tap_done();
 }
