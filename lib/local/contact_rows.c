@@ -261,6 +261,7 @@ static void add_contact(hapi_rows *rows, placed_contact *c, const hapi_contact_m
   set_columns(c, 0, directions, own, count);
   set_columns(c, 1, directions, own, count);
   set_normal(facts, c, &own[0], &rows->sources[first], sample);
+  rows->lifts = rows->lifts || rows->sources[first].pushes_out;
   for (uint32_t i = 1; i < count; ++i) {
     set_friction(facts->period, c->surface, &own[i], parts[i], (int32_t)first);
   }
@@ -543,6 +544,7 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   }
   rows->sources[first].pushes_out = false;
   set_normal(facts, c, &solver->rows[first], &rows->sources[first], sample);
+  rows->lifts = rows->lifts || rows->sources[first].pushes_out;
   rows_note_plain(&solver->rows[first], c, facts, kept);
   solver->row_count += count;
   rows->kept += count;

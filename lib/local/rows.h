@@ -43,7 +43,9 @@ typedef struct hapi_rows {
   hapi_work work;
   hapi_row_source *sources; /* of the rows; capacity */
   uint32_t capacity;
-  uint32_t kept; /* rows of the tick before that go on in this one */
+  uint32_t kept;  /* rows of the tick before that go on in this one */
+  uint32_t first; /* of contacts between bodies */
+  bool lifts;     /* one of these pushes out */
   double drift;  /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
   double hand;  /* J s^2, the least F^2 / (k^2 a) of the tick's springs to hands, with F of the tick
                    before; HUGE_VAL: none */

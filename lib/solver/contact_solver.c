@@ -170,7 +170,9 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, boo
     bool packable = by_mass && hapi_row_moves_a(r) && r[0].lo == 0.0 && r[0].hi == HUGE_VAL &&
                     r[1].mu + r[2].mu < HUGE_VAL;
     r->triple = r->triple && packable ? HAPI_TRIPLE_BY_MASS : r->triple;
-    solver->packs.known.ready += r->triple == HAPI_TRIPLE_BY_MASS;
+    if (r->triple == HAPI_TRIPLE_BY_MASS) {
+      hapi_packs_note(&solver->packs, first, true);
+    }
   }
   for (uint32_t i = 0; i < count; ++i) {
     if (r->triple) {
@@ -303,7 +305,9 @@ void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count)
     }
   }
   if (r->triple) {
-    solver->packs.known.ready += r->triple == HAPI_TRIPLE_BY_MASS;
+    if (r->triple == HAPI_TRIPLE_BY_MASS) {
+      hapi_packs_note(&solver->packs, first, false);
+    }
     solver->owes = true;
     return;
   }
@@ -660,6 +664,7 @@ void hapi_solver_sweep_on(hapi_solver *solver)
 /* Each row has its bodies to itself: what is due after its update is rounding. */
 static void run_apart(hapi_solver *solver)
 {
+  solver->packs.known.alike = false;
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     hapi_row *row = &solver->rows[i];
     double old = row->impulse;

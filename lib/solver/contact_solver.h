@@ -109,7 +109,7 @@ void hapi_solver_calm(hapi_solver *solver);
 static inline void hapi_solver_clear(hapi_solver *solver)
 {
   solver->row_count = 0;
-  solver->packs.known.ready = 0;
+  solver->packs.known.ready = solver->packs.known.news = 0;
   solver->owes = false;
 }
 
@@ -143,6 +143,7 @@ static inline void hapi_contact_stands(hapi_solver *solver, bool by_mass)
 static inline void hapi_contact_moved(hapi_solver *solver)
 {
   ++solver->packs.known.made;
+  solver->packs.known.alike = false;
 }
 
 /* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */
@@ -242,10 +243,12 @@ static inline double hapi_row_error(const hapi_solver *solver, const hapi_row *r
 }
 
 /* Another target between two runs. */
-static inline void hapi_row_retarget(hapi_row *row, double target)
+static inline void hapi_row_retarget(hapi_solver *solver, uint32_t index, double target)
 {
+  hapi_row *row = &solver->rows[index];
   row->drive += target - row->target;
   row->target = target;
+  solver->packs.known.alike = false;
 }
 
 static inline void hapi_row_push(hapi_solver *solver, hapi_row *row, double change)

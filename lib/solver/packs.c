@@ -140,8 +140,8 @@ static void units_find(hapi_packs *packs, const hapi_row *rows, uint32_t row_cou
       packs->units[units++] =
           (hapi_pack_unit){.first = packs->packable_count, .paired = row->paired};
     }
-    packs->packables[packs->packable_count++] =
-        (hapi_packable){.row = i, .a = row->a, .b = row->b, .place = HAPI_NO_PLACE};
+    packs->packables[packs->packable_count++] = (hapi_packable){
+        .row = i, .a = row->a, .b = row->b, .place = HAPI_NO_PLACE, .unit = units - 1};
     ++packs->units[units - 1].count;
     i += 2;
   }
@@ -416,11 +416,72 @@ static bool packs_hold(const hapi_packs *packs, const hapi_row *rows, uint32_t r
   return true;
 }
 
+static bool news_hold(const hapi_packs *packs, const hapi_row *rows, const hapi_pack_news *news)
+{
+  const hapi_packable *packable = &packs->packables[news->which];
+  return packable->row == news->row && unit_holds(packs, rows, &packs->units[packable->unit]);
+}
+
+static bool is_alike(const hapi_packs *packs, const hapi_row *rows)
+{
+  bool same = true;
+  for (uint32_t i = 0; i < packs->packable_count; ++i) {
+    uint32_t at = packs->packables[i].place / HAPI_LANES;
+    uint32_t lane = packs->packables[i].place % HAPI_LANES;
+    const hapi_row *row = &rows[packs->packables[i].row];
+    for (int k = 0; packs->packables[i].place != HAPI_NO_PLACE && k < 3; ++k) {
+      same = same && packs->contacts[at].drive[k][lane] == row[k].drive &&
+             packs->impulse[at][k][lane] == row[k].impulse;
+    }
+  }
+  return same;
+}
+
+/* Where as many contacts may be packed as before, and what was made anew is where its like was, all
+ * are where they were: what is not new was not moved. Then nothing else is looked at. */
+static bool packs_take_news(hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
+                            uint32_t body_count)
+{
+  bool made = false;
+  if (packs->count == 0 || !packs->known.alike || packs->known.row_count != row_count ||
+      packs->known.body_count != body_count || packs->known.ready != packs->packable_count) {
+    return false;
+  }
+  for (uint32_t i = 0; i < packs->known.news; ++i) {
+    if (packs->news[i].made && !news_hold(packs, rows, &packs->news[i])) {
+      return false;
+    }
+  }
+  for (uint32_t i = 0; i < packs->known.news; ++i) {
+    const hapi_packable *packable = &packs->packables[packs->news[i].which];
+    if (packs->news[i].made) {
+      unit_fill(packs, rows, &packs->units[packable->unit]);
+      made = true;
+    } else if (packable->place != HAPI_NO_PLACE) {
+      lane_set_impulses(packs, packable->place, &rows[packable->row]);
+    }
+  }
+  if (made) {
+    packs->work->couple(packs);
+  }
+  HAPI_ASSERT(is_alike(packs, rows));
+  return true;
+}
+
 /* Whether four at once are quicker than one by one. */
 static bool packs_pay(const hapi_packs *packs)
 {
   uint32_t packed = (packs->known.row_count - packs->loose_rows) / 3;
   return packs->count > 0 && packed >= FULL_LEAST * packs->contact_count;
+}
+
+/* All that the packs have of the rows is of now. */
+static void packs_know(hapi_packs *packs)
+{
+  packs->known.filled = packs->known.made;
+  packs->known.held = packs->known.ready;
+  packs->known.alike = true;
+  packs->known.news = 0;
 }
 
 bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
@@ -430,8 +491,13 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
     packs->count = packs->height = 0;
     return false;
   }
+  if (packs_take_news(packs, rows, row_count, body_count)) {
+    packs_know(packs);
+    return true;
+  }
   if (packs_stand(packs, row_count, body_count)) {
     packs_set_impulses(packs, rows);
+    packs_know(packs);
     return true;
   }
   if (!packs_hold(packs, rows, row_count, body_count)) {
@@ -457,8 +523,7 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
     packs->known.anew = true;
   }
   packs_fill(packs, rows);
-  packs->known.filled = packs->known.made;
-  packs->known.held = packs->known.ready;
+  packs_know(packs);
   return true;
 }
 
@@ -481,5 +546,6 @@ void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows)
 void hapi_packs_forget(hapi_packs *packs)
 {
   packs->count = packs->contact_count = packs->packable_count = 0;
+  packs->known.alike = false;
   packs->loose_count = packs->loose_rows = packs->known.row_count = packs->known.body_count = 0;
 }

@@ -67,8 +67,16 @@ typedef struct hapi_packable {
   uint32_t b;
   uint32_t place; /* contact x HAPI_LANES + lane; HAPI_NO_PLACE: in no pack */
   uint32_t pack;
+  uint32_t unit;
   uint64_t made; /* see hapi_row, of what was packed */
 } hapi_packable;
+
+/* A contact that is not as it was in the last run. */
+typedef struct hapi_pack_news {
+  uint32_t which; /* of those that may be packed, in their order */
+  uint32_t row;   /* its normal's */
+  bool made;      /* anew; false: it asks for something else */
+} hapi_pack_news;
 
 /* Successive packable contacts of the same bodies and directions, HAPI_PACK_CONTACTS at most. */
 typedef struct hapi_pack_unit {
@@ -118,7 +126,9 @@ typedef struct hapi_packed_rows {
   uint32_t held;      /* and when the packs were filled */
   uint32_t row_count; /* all rows, when the packs were made */
   uint32_t body_count;
-  bool anew; /* the packs are others since all pairs were planned (solver/aggregate.h) */
+  bool anew;  /* the packs are others since all pairs were planned (solver/aggregate.h) */
+  bool alike; /* what packs have of the rows is as there, but for the news */
+  uint32_t news;
 } hapi_packed_rows;
 
 /* Scratch, while the packs are made. */
@@ -135,7 +145,8 @@ typedef struct hapi_packs {
   hapi_pack_contact *contacts;
   hapi_pack_block *blocks;          /* HAPI_PACK_BLOCKS(contact_capacity) */
   double (*impulse)[3][HAPI_LANES]; /* N s, by contact */
-  hapi_packable *packables;         /* HAPI_LANES x contact_capacity, as the next two */
+  hapi_packable *packables;         /* HAPI_LANES x contact_capacity, as the next three */
+  hapi_pack_news *news;             /* since the last call of hapi_packs_begin */
   hapi_pack_unit *units;
   hapi_loose_rows *loose;
   hapi_pack_plan plan;
@@ -168,5 +179,16 @@ void hapi_packs_store(const hapi_packs *packs, hapi_row *rows);
 void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows);
 /* Nothing is known of any rows. */
 void hapi_packs_forget(hapi_packs *packs);
+
+/* The next contact that may be packed is not as it was. row: its normal's. */
+static inline void hapi_packs_note(hapi_packs *packs, uint32_t row, bool made)
+{
+  hapi_packed_rows *known = &packs->known;
+  known->alike = known->alike && known->news < HAPI_LANES * packs->contact_capacity;
+  if (known->alike) {
+    packs->news[known->news++] = (hapi_pack_news){known->ready, row, made};
+  }
+  ++known->ready;
+}
 
 #endif

@@ -100,6 +100,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   solver->body_count = 1;
   hapi_solver_clear(solver);
   rows->kept = 0;
+  rows->lifts = false;
   solver->apart = true;
   rows->hand = HUGE_VAL;
   bodies->resting = bodies->quiet = 0;
@@ -409,14 +410,15 @@ static bool rows_stop_push_out(hapi_rows *rows)
   if (solver->apart) { /* rows of pointers that are no proxies: none of them pushes out */
     return false;
   }
-  for (uint32_t i = 0; i < solver->row_count && !any;) {
+  uint32_t end = rows->lifts ? solver->row_count : rows->first;
+  for (uint32_t i = 0; i < end && !any;) {
     const hapi_row_source *source = &rows->sources[i];
     any = source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0);
     i += source->pointer || source->joint ? 1 : source->count; /* frictions do not */
   }
   for (uint32_t i = 0; any && i < solver->row_count; ++i) {
     if (rows->sources[i].pushes_out) {
-      hapi_row_retarget(&solver->rows[i], rows->sources[i].stays);
+      hapi_row_retarget(solver, i, rows->sources[i].stays);
     }
   }
   return any;
@@ -606,6 +608,7 @@ static void rows_make(hapi_tick *tick)
   if (tick->bodies.still > 0) {
     hapi_still_check(&tick->contacts, &tick->bodies, rows, &tick->facts);
   }
+  rows->first = rows->solver.row_count;
   if (patches != NULL && patches->contact_count > 0) {
     uint64_t begin = hapi_effect_begin(sample);
     hapi_contact_rows(&tick->contacts, &tick->bodies, rows, &tick->facts, sample);

@@ -67,6 +67,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(rows.solver.packs.blocks, HAPI_PACK_BLOCKS(packs)),
       ARRAY(rows.solver.packs.impulse, packs),
       ARRAY(rows.solver.packs.packables, HAPI_LANES * packs),
+      ARRAY(rows.solver.packs.news, HAPI_LANES * packs),
       ARRAY(rows.solver.packs.units, HAPI_LANES * packs),
       ARRAY(rows.solver.packs.plan.order, HAPI_LANES * packs),
       ARRAY(rows.solver.packs.plan.sorted, HAPI_LANES * packs),
