@@ -46,7 +46,7 @@ typedef struct hapi_rows {
   uint32_t kept;  /* rows of the tick before that go on in this one */
   uint32_t first; /* of contacts between bodies */
   bool lifts;     /* one of these pushes out */
-  double drift;  /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
+  double drift;   /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
   double hand;  /* J s^2, the least F^2 / (k^2 a) of the tick's springs to hands, with F of the tick
                    before; HUGE_VAL: none */
   bool touched; /* by a pointer that has been in reach since */

@@ -2,8 +2,8 @@
  * SPDX-License-Identifier: MIT */
 
 /* Runs a fuzzer on every file of a folder, whole and cut off at every byte, or at each so manyth
- * one: what fuzzing has found once is tested wherever the tests run, without libFuzzer. An input that
- * fails ends the program; the last line with a '#' tells which it was. */
+ * one: what fuzzing has found once is tested wherever the tests run, without libFuzzer. An input
+ * that fails ends the program; the last line with a '#' tells which it was. */
 
 #include "tests/tap.h"
 
