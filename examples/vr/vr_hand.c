@@ -93,17 +93,6 @@ static XrResult frames_run(vr_app *app)
   return result;
 }
 
-/* On a busy machine what is felt is less than it should be. */
-static void tell_lateness(const vr_world *world)
-{
-  hap_stats stats;
-  if (hap_session_stats(world->session, &stats, sizeof stats) >= HAP_OK &&
-      stats.safety.derated_ticks > 0) {
-    printf("ticks came late: the force was lowered in %llu of %llu\n",
-           (unsigned long long)stats.safety.derated_ticks, (unsigned long long)stats.loop.ticks);
-  }
-}
-
 int main(void)
 {
   static vr_app app;
@@ -121,7 +110,6 @@ int main(void)
     fprintf(stderr, "%s: %s\n", hap_status_text(status), why.text);
   } else {
     result = frames_run(&app);
-    tell_lateness(&app.world);
   }
   vr_world_destroy(&app.world);
   xr_end(&app.xr);

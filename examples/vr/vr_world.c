@@ -3,6 +3,7 @@
 #include "vr_world.h"
 
 #include <math.h>
+#include <stdio.h>
 
 /* 10 cm, 1 kg, half a metre in front of the stage's middle. */
 static hap_status box_add(vr_world *world, hap_detail *why)
@@ -42,8 +43,20 @@ hap_status vr_world_create(vr_world *world, hap_detail *why)
   return s;
 }
 
+/* On a busy machine what is felt is less than it should be. */
+static void tell_lateness(const vr_world *world)
+{
+  hap_stats stats;
+  if (hap_session_stats(world->session, &stats, sizeof stats) >= HAP_OK &&
+      stats.safety.derated_ticks > 0) {
+    printf("ticks came late: the force was lowered in %llu of %llu\n",
+           (unsigned long long)stats.safety.derated_ticks, (unsigned long long)stats.loop.ticks);
+  }
+}
+
 void vr_world_destroy(vr_world *world)
 {
+  tell_lateness(world);
   hap_session_destroy(world->session); /* zero force first */
   hap_device_close(world->hand_def.device);
   (void)hap_scene_destroy(world->scene);

@@ -20,7 +20,8 @@ typedef struct vr_world {
   uint32_t box;
 } vr_world;
 
-/* A floor and a box, and a session that runs. On failure: why. vr_world_destroy frees it. */
+/* A floor and a box, and a session that runs. On failure: why. vr_world_destroy frees it, and says
+ * where ticks came late. */
 hap_status vr_world_create(vr_world *world, hap_detail *why);
 void vr_world_destroy(vr_world *world);
 
