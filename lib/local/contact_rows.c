@@ -240,6 +240,18 @@ static bool answers_by_mass(const hapi_local_body *body)
   return body == NULL || (body->flags & HAPI_BODY_MEASURED) == 0;
 }
 
+/* Of a contact that is ready. */
+static void note_lifted(hapi_rows *rows, uint32_t first)
+{
+  const hapi_solver *solver = &rows->solver;
+  if (rows->sources[first].pushes_out) {
+    bool packable = solver->rows[first].triple == HAPI_TRIPLE_BY_MASS;
+    HAPI_ASSERT_INDEX(rows->lifted_count, rows->capacity);
+    rows->lifted[rows->lifted_count++] =
+        (hapi_row_lifted){first, packable ? solver->packs.known.ready - 1 : HAPI_NO_PACKABLE};
+  }
+}
+
 static void add_contact(hapi_rows *rows, placed_contact *c, const hapi_contact_memory *memory,
                         const hapi_tick_facts *facts, hapi_effect_sample *sample)
 {
@@ -261,12 +273,12 @@ static void add_contact(hapi_rows *rows, placed_contact *c, const hapi_contact_m
   set_columns(c, 0, directions, own, count);
   set_columns(c, 1, directions, own, count);
   set_normal(facts, c, &own[0], &rows->sources[first], sample);
-  rows->lifts = rows->lifts || rows->sources[first].pushes_out;
   for (uint32_t i = 1; i < count; ++i) {
     set_friction(facts->period, c->surface, &own[i], parts[i], (int32_t)first);
   }
   solver->row_count += count;
   hapi_contact_ready(solver, first, count, answers_by_mass(c->a) && answers_by_mass(c->b));
+  note_lifted(rows, first);
 }
 
 /* A body that the contact was made for, and that is where the contact thread thought it was. */
@@ -544,11 +556,11 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   }
   rows->sources[first].pushes_out = false;
   set_normal(facts, c, &solver->rows[first], &rows->sources[first], sample);
-  rows->lifts = rows->lifts || rows->sources[first].pushes_out;
   rows_note_plain(&solver->rows[first], c, facts, kept);
   solver->row_count += count;
   rows->kept += count;
   hapi_contact_again(solver, first, count);
+  note_lifted(rows, first);
   return true;
 }
 

@@ -38,15 +38,22 @@ typedef struct hapi_work {
   double usual;  /* about the median of a tick, each row counted as kept */
 } hapi_work;
 
+/* A contact between bodies that pushes out. */
+typedef struct hapi_row_lifted {
+  uint32_t row;   /* its normal's */
+  uint32_t which; /* of those that may be packed, see hapi_packs_note; HAPI_NO_PACKABLE: none */
+} hapi_row_lifted;
+
 typedef struct hapi_rows {
   hapi_solver solver;
   hapi_work work;
   hapi_row_source *sources; /* of the rows; capacity */
   uint32_t capacity;
-  uint32_t kept;  /* rows of the tick before that go on in this one */
-  uint32_t first; /* of contacts between bodies */
-  bool lifts;     /* one of these pushes out */
-  double drift;   /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
+  uint32_t kept;           /* rows of the tick before that go on in this one */
+  uint32_t first;          /* of contacts between bodies */
+  hapi_row_lifted *lifted; /* in this tick; capacity */
+  uint32_t lifted_count;
+  double drift; /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
   double hand;  /* J s^2, the least F^2 / (k^2 a) of the tick's springs to hands, with F of the tick
                    before; HUGE_VAL: none */
   bool touched; /* by a pointer that has been in reach since */

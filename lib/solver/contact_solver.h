@@ -242,13 +242,11 @@ static inline double hapi_row_error(const hapi_solver *solver, const hapi_row *r
   return rest - w;
 }
 
-/* Another target between two runs. */
-static inline void hapi_row_retarget(hapi_solver *solver, uint32_t index, double target)
+/* Another target between two runs, of a row in no pack or of a packable contact's normal. */
+static inline void hapi_row_retarget(hapi_row *row, double target)
 {
-  hapi_row *row = &solver->rows[index];
   row->drive += target - row->target;
   row->target = target;
-  solver->packs.known.alike = false;
 }
 
 static inline void hapi_row_push(hapi_solver *solver, hapi_row *row, double change)

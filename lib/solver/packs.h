@@ -16,6 +16,7 @@
 
 #define HAPI_LANES 4u
 #define HAPI_NO_PLACE UINT32_MAX
+#define HAPI_NO_PACKABLE UINT32_MAX
 
 /* Contacts of a pack, at most: one below the other, of the same two bodies and directions. */
 #define HAPI_PACK_CONTACTS 4u
@@ -180,15 +181,19 @@ void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows);
 /* Nothing is known of any rows. */
 void hapi_packs_forget(hapi_packs *packs);
 
-/* The next contact that may be packed is not as it was. row: its normal's. */
-static inline void hapi_packs_note(hapi_packs *packs, uint32_t row, bool made)
+static inline void hapi_packs_add_news(hapi_packs *packs, hapi_pack_news news)
 {
   hapi_packed_rows *known = &packs->known;
   known->alike = known->alike && known->news < HAPI_LANES * packs->contact_capacity;
   if (known->alike) {
-    packs->news[known->news++] = (hapi_pack_news){known->ready, row, made};
+    packs->news[known->news++] = news;
   }
-  ++known->ready;
+}
+
+/* The next contact that may be packed is not as it was. row: its normal's. */
+static inline void hapi_packs_note(hapi_packs *packs, uint32_t row, bool made)
+{
+  hapi_packs_add_news(packs, (hapi_pack_news){packs->known.ready++, row, made});
 }
 
 #endif

@@ -100,7 +100,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   solver->body_count = 1;
   hapi_solver_clear(solver);
   rows->kept = 0;
-  rows->lifts = false;
+  rows->lifted_count = 0;
   solver->apart = true;
   rows->hand = HUGE_VAL;
   bodies->resting = bodies->quiet = 0;
@@ -401,27 +401,44 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
   }
 }
 
+static bool any_pushes_out(const hapi_rows *rows)
+{
+  for (uint32_t i = 0; i < rows->first; ++i) {
+    if (rows->sources[i].pushes_out &&
+        (rows->sources[i].joint || rows->solver.rows[i].impulse > 0.0)) {
+      return true;
+    }
+  }
+  for (uint32_t i = 0; i < rows->lifted_count; ++i) {
+    if (rows->solver.rows[rows->lifted[i].row].impulse > 0.0) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /* Push-out and the closing of joints move the bodies, and are not to stay in their velocities:
  * poses first, then a second solve without them. True: it has to be made. */
 static bool rows_stop_push_out(hapi_rows *rows)
 {
   hapi_solver *solver = &rows->solver;
-  bool any = false;
-  if (solver->apart) { /* rows of pointers that are no proxies: none of them pushes out */
+  /* rows of pointers that are no proxies do not push out */
+  if (solver->apart || !any_pushes_out(rows)) {
     return false;
   }
-  uint32_t end = rows->lifts ? solver->row_count : rows->first;
-  for (uint32_t i = 0; i < end && !any;) {
-    const hapi_row_source *source = &rows->sources[i];
-    any = source->pushes_out && (source->joint || solver->rows[i].impulse > 0.0);
-    i += source->pointer || source->joint ? 1 : source->count; /* frictions do not */
-  }
-  for (uint32_t i = 0; any && i < solver->row_count; ++i) {
+  for (uint32_t i = 0; i < rows->first; ++i) {
     if (rows->sources[i].pushes_out) {
-      hapi_row_retarget(solver, i, rows->sources[i].stays);
+      hapi_row_retarget(&solver->rows[i], rows->sources[i].stays);
     }
   }
-  return any;
+  for (uint32_t i = 0; i < rows->lifted_count; ++i) {
+    const hapi_row_lifted *at = &rows->lifted[i];
+    hapi_row_retarget(&solver->rows[at->row], rows->sources[at->row].stays);
+    if (at->which != HAPI_NO_PACKABLE) {
+      hapi_packs_add_news(&solver->packs, (hapi_pack_news){at->which, at->row, false});
+    }
+  }
+  return true;
 }
 
 /* The solver's time by the rows that each effect has in it. */

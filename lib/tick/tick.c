@@ -58,6 +58,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(joints.of, c->joints),
       ARRAY(joints.memory, c->joints),
       ARRAY(rows.sources, tick->rows.capacity),
+      ARRAY(rows.lifted, tick->rows.capacity),
       ARRAY(rows.solver.rows, tick->rows.capacity),
       ARRAY(rows.solver.v, places),
       ARRAY(rows.solver.free, places),
