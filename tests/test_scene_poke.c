@@ -175,7 +175,8 @@ static void poke_with(const char *path, int seconds, hap_drive drive, int32_t sw
   CHECK(p.fastest < FASTEST);
   CHECK(p.lowest > -0.1 && p.highest < 2.5);
   if (drive == HAP_DRIVE_LOCKSTEP) {
-    CHECK((stats.room.unsolved_ticks <= stats.loop.ticks / 500) == (sweeps == 0));
+    bool is_solved = stats.room.unsolved_ticks <= stats.loop.ticks / 500;
+    CHECK(is_solved == (sweeps == 0)); /* few sweeps must leave something, or nothing is tested */
   }
   hap_session_destroy(p.session);
   hap_device_close(p.device);

@@ -738,9 +738,9 @@ void hapi_joint_rows(hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *
 
 /* ---- after the solve ---- */
 
-/* A rotor turns as its row says, and its axis as the solver left it. Where rows are left unsolved
- * the two differ, and a rotor that were as fast as its axis would have energy from nowhere: a light
- * body that a hard contact turns would take a heavy rotor along. */
+/* Rotor and axis have the same speed only where the row between them is solved. Where it is not, the
+ * rotor keeps its own speed. If it took that of the axis, energy would come from nowhere: a hard
+ * contact would spin up a light body, and the heavy rotor with it. */
 void hapi_joint_keep(const hapi_joints *joints, const hapi_rows *rows, uint32_t row)
 {
   const hapi_solver *solver = &rows->solver;

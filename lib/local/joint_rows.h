@@ -18,7 +18,9 @@ typedef struct hapi_joint_memory {
   uint32_t measurement;             /* whose rows the impulses are of */
   bool tells;                       /* in this tick, to given */
   double impulse[HAPI_JOINT_PARTS]; /* N s, N m s, of the last tick */
-  double slip[HAPI_JOINT_LIMITS]; /* rad/s, m/s: rotors, as it left them, faster than their axes */
+  /* rad/s, m/s: speed of each axis' rotor less that of the axis, after the last tick; 0 where all
+   * rows were solved */
+  double slip[HAPI_JOINT_LIMITS];
   hapi_joint_given given;
 } hapi_joint_memory;
 
@@ -38,7 +40,7 @@ void hapi_joint_wake(const hapi_joints *joints, const hapi_bodies *bodies, hapi_
 void hapi_joint_rows(hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *rows,
                      const hapi_tick_facts *facts);
 
-/* After the solve, of the row of a joint. */
+/* After the solve: keeps the impulse of a joint's row, and the slip of a rotor. */
 void hapi_joint_keep(const hapi_joints *joints, const hapi_rows *rows, uint32_t row);
 
 /* After the solve: adds to what physics is told of joints. */

@@ -38,10 +38,10 @@ typedef struct hapi_work {
   double usual;  /* about the median of a tick, each row counted as kept */
 } hapi_work;
 
-/* A contact between bodies that pushes out. */
+/* A contact between bodies whose target pushes them out of each other. */
 typedef struct hapi_row_lifted {
   uint32_t row;   /* its normal's */
-  uint32_t which; /* of those that may be packed, see hapi_packs_note; HAPI_NO_PACKABLE: none */
+  uint32_t which; /* index into packables; HAPI_NO_PACKABLE: it is not packable */
 } hapi_row_lifted;
 
 typedef struct hapi_rows {
@@ -50,7 +50,7 @@ typedef struct hapi_rows {
   hapi_row_source *sources; /* of the rows; capacity */
   uint32_t capacity;
   uint32_t kept;           /* rows of the tick before that go on in this one */
-  uint32_t first;          /* of contacts between bodies */
+  uint32_t contact_begin;  /* the first row of contacts between bodies */
   hapi_row_lifted *lifted; /* in this tick; capacity */
   uint32_t lifted_count;
   double drift; /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */

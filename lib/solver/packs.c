@@ -437,8 +437,9 @@ static bool is_alike(const hapi_packs *packs, const hapi_row *rows)
   return same;
 }
 
-/* Where as many contacts may be packed as before, and what was made anew is where its like was, all
- * are where they were: what is not new was not moved. Then nothing else is looked at. */
+/* Copies only the changed contacts. This is enough where there are as many packable contacts as
+ * before and each new one has the place of an old one: the others did not move, or alike would be
+ * false. Returns false otherwise. */
 static bool packs_take_news(hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
                             uint32_t body_count)
 {
@@ -475,7 +476,7 @@ static bool packs_pay(const hapi_packs *packs)
   return packs->count > 0 && packed >= FULL_LEAST * packs->contact_count;
 }
 
-/* All that the packs have of the rows is of now. */
+/* Packs and rows hold the same values from here on. */
 static void packs_know(hapi_packs *packs)
 {
   packs->known.filled = packs->known.made;

@@ -68,15 +68,15 @@ typedef struct hapi_packable {
   uint32_t b;
   uint32_t place; /* contact x HAPI_LANES + lane; HAPI_NO_PLACE: in no pack */
   uint32_t pack;
-  uint32_t unit;
+  uint32_t unit; /* that it belongs to */
   uint64_t made; /* see hapi_row, of what was packed */
 } hapi_packable;
 
-/* A contact that is not as it was in the last run. */
+/* A packable contact whose rows changed since the last run. */
 typedef struct hapi_pack_news {
-  uint32_t which; /* of those that may be packed, in their order */
+  uint32_t which; /* index into packables */
   uint32_t row;   /* its normal's */
-  bool made;      /* anew; false: it asks for something else */
+  bool made;      /* rows made anew; false: same rows, other targets */
 } hapi_pack_news;
 
 /* Successive packable contacts of the same bodies and directions, HAPI_PACK_CONTACTS at most. */
@@ -127,9 +127,9 @@ typedef struct hapi_packed_rows {
   uint32_t held;      /* and when the packs were filled */
   uint32_t row_count; /* all rows, when the packs were made */
   uint32_t body_count;
-  bool anew;  /* the packs are others since all pairs were planned (solver/aggregate.h) */
-  bool alike; /* what packs have of the rows is as there, but for the news */
-  uint32_t news;
+  bool anew;     /* the packs are others since all pairs were planned (solver/aggregate.h) */
+  bool alike;    /* packs hold the same values as the rows, except for the news */
+  uint32_t news; /* how many */
 } hapi_packed_rows;
 
 /* Scratch, while the packs are made. */
@@ -190,7 +190,8 @@ static inline void hapi_packs_add_news(hapi_packs *packs, hapi_pack_news news)
   }
 }
 
-/* The next contact that may be packed is not as it was. row: its normal's. */
+/* Says that the next packable contact has changed; they are counted in the order of their rows.
+ * row: its normal's. */
 static inline void hapi_packs_note(hapi_packs *packs, uint32_t row, bool made)
 {
   hapi_packs_add_news(packs, (hapi_pack_news){packs->known.ready++, row, made});

@@ -136,7 +136,7 @@ void hapi_solver_calm(hapi_solver *solver)
     return;
   }
   solver->packs.in_use = solver->packs.stored;
-  solver->packs.known.alike = false; /* impulses of rows may become shorter */
+  solver->packs.known.alike = false; /* the last shortening changes rows alone */
   find_islands(solver, &r);
   if (rays_measure(solver, &r)) {
     impulses_shorten(solver, &r);

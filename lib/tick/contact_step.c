@@ -403,7 +403,7 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
 
 static bool any_pushes_out(const hapi_rows *rows)
 {
-  for (uint32_t i = 0; i < rows->first; ++i) {
+  for (uint32_t i = 0; i < rows->contact_begin; ++i) {
     if (rows->sources[i].pushes_out &&
         (rows->sources[i].joint || rows->solver.rows[i].impulse > 0.0)) {
       return true;
@@ -426,7 +426,7 @@ static bool rows_stop_push_out(hapi_rows *rows)
   if (solver->apart || !any_pushes_out(rows)) {
     return false;
   }
-  for (uint32_t i = 0; i < rows->first; ++i) {
+  for (uint32_t i = 0; i < rows->contact_begin; ++i) {
     if (rows->sources[i].pushes_out) {
       hapi_row_retarget(&solver->rows[i], rows->sources[i].stays);
     }
@@ -625,7 +625,7 @@ static void rows_make(hapi_tick *tick)
   if (tick->bodies.still > 0) {
     hapi_still_check(&tick->contacts, &tick->bodies, rows, &tick->facts);
   }
-  rows->first = rows->solver.row_count;
+  rows->contact_begin = rows->solver.row_count;
   if (patches != NULL && patches->contact_count > 0) {
     uint64_t begin = hapi_effect_begin(sample);
     hapi_contact_rows(&tick->contacts, &tick->bodies, rows, &tick->facts, sample);

@@ -1,9 +1,9 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Runs a fuzzer on every file of a folder, whole and cut off at every byte, or at each so manyth
- * one: what fuzzing has found once is tested wherever the tests run, without libFuzzer. An input
- * that fails ends the program; the last line with a '#' tells which it was. */
+/* Runs a fuzzer on every file of a folder, whole and cut off at every byte, or every Nth: what
+ * fuzzing has found once is tested wherever the tests run, without libFuzzer. An input that fails
+ * ends the program; the last line with a '#' tells which it was. */
 
 #include "tests/tap.h"
 
