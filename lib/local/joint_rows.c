@@ -738,9 +738,9 @@ void hapi_joint_rows(hapi_joints *joints, const hapi_bodies *bodies, hapi_rows *
 
 /* ---- after the solve ---- */
 
-/* Rotor and axis have the same speed only where the row between them is solved. Where it is not, the
- * rotor keeps its own speed. If it took that of the axis, energy would come from nowhere: a hard
- * contact would spin up a light body, and the heavy rotor with it. */
+/* Rotor and axis have the same speed only where the row between them is solved. Where it is not,
+ * the rotor keeps its own speed. If it took that of the axis, energy would come from nowhere: a
+ * hard contact would spin up a light body, and the heavy rotor with it. */
 void hapi_joint_keep(const hapi_joints *joints, const hapi_rows *rows, uint32_t row)
 {
   const hapi_solver *solver = &rows->solver;

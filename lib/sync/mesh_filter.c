@@ -59,9 +59,9 @@ void hapi_mesh_straighten(const double *corners, hapi_patch_point *io)
   hapi_v3_copy(corners, io->core_b);
 }
 
-/* Whether the normal leans over open edges only, by its part in the triangle's plane. Up to 5 degrees
- * over a closed edge are allowed where it leans farther over an open one: the side of a box counts
- * as flat on an open edge up to that angle. */
+/* Whether the normal leans over open edges only, by its part in the triangle's plane. Up to 5
+ * degrees over a closed edge are allowed where it leans farther over an open one: the side of a box
+ * counts as flat on an open edge up to that angle. */
 static bool leans_over_open(uint32_t open_edges, double sides[3][3], const double own[3],
                             const double normal[3])
 {
