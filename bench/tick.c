@@ -100,6 +100,10 @@ static bool tick_save(const hapi_tick *tick, tick_state *out)
 static void tick_restore(hapi_tick *tick, const tick_state *saved)
 {
   size_t used = 0;
+  hapi_solver *solver = &tick->rows.solver;
+  if (solver->packs.ahead) {
+    hapi_packs_store(&solver->packs, solver->rows);
+  }
   *tick = saved->tick;
   for (size_t i = 0; i < TICK_ARRAYS; ++i) {
     memcpy(saved->arrays[i].at, saved->bytes + used, saved->arrays[i].bytes);
@@ -107,7 +111,7 @@ static void tick_restore(hapi_tick *tick, const tick_state *saved)
   }
   /* Its arrays are those of the tick that was measured: with the counts of the one before, sweeps
    * went beyond their ends. */
-  hapi_packs_forget(&tick->rows.solver.packs);
+  hapi_packs_forget(&solver->packs);
 }
 
 /* The tick of model CONTACT, which carries the contacts between the bodies itself: cubes that touch

@@ -73,6 +73,20 @@ static inline void problem_link(problem *p, const hapi_pack_work *work)
   p->solver.packs.body_capacity = BODIES;
 }
 
+/* The rows have all impulses then. */
+static inline void problem_run_by(problem *p, void (*run)(hapi_solver *))
+{
+  run(&p->solver);
+  if (p->solver.packs.ahead) {
+    hapi_packs_store(&p->solver.packs, p->rows);
+  }
+}
+
+static inline void problem_run(problem *p)
+{
+  problem_run_by(p, hapi_solver_run);
+}
+
 /* -1 .. 1 */
 static inline double random_next(uint64_t *state)
 {

@@ -106,7 +106,7 @@ static double row_miss(const problem *p)
 TEST(a_row_of_cubes_ends_as_in_its_closed_form)
 {
   row_make(&one, hapi_pack_work_best(), true);
-  hapi_solver_run(&one.solver);
+  problem_run(&one);
   CHECK(one.solver.residual < 1e-9);
   CHECK(one.solver.packs.aggregate->count == BODIES - 2);
   CHECK_SAY(row_miss(&one) < 1e-8, "%g", row_miss(&one));
@@ -123,7 +123,7 @@ TEST(a_row_of_cubes_is_near_its_end_after_a_few_sweeps)
     problem *p = pairs ? &one : &two;
     row_make(p, hapi_pack_work_best(), pairs);
     p->solver.max_sweeps = 16;
-    hapi_solver_run(&p->solver);
+    problem_run(p);
     CHECK(p->solver.sweeps == 16);
   }
   CHECK_SAY(row_miss(&one) < 0.01 * CUBE * SPEED, "%g", row_miss(&one));
@@ -242,13 +242,13 @@ TEST(the_bits_are_the_same_by_pairs_and_in_plain_c)
     tree_make(&one, hapi_pack_work_best(), seed);
     tree_make(&two, &hapi_pack_work_pairs, seed);
     one.solver.max_sweeps = two.solver.max_sweeps = 12;
-    hapi_solver_run(&one.solver);
-    hapi_solver_run(&two.solver);
+    problem_run(&one);
+    problem_run(&two);
     CHECK(one.solver.packs.aggregate->count > 0);
     CHECK(memcmp(one.v, two.v, sizeof one.v) == 0);
     tree_make(&two, &plain_hapi_pack_work_pairs, seed);
     two.solver.max_sweeps = 12;
-    plain_hapi_solver_run(&two.solver);
+    problem_run_by(&two, plain_hapi_solver_run);
     CHECK(memcmp(one.v, two.v, sizeof one.v) == 0);
   }
 }
@@ -292,8 +292,8 @@ TEST(a_step_is_within_the_budget)
   row_make(&one, hapi_pack_work_best(), true);
   row_make(&two, hapi_pack_work_best(), false);
   one.solver.update_budget = two.solver.update_budget = 1000;
-  hapi_solver_run(&one.solver);
-  hapi_solver_run(&two.solver);
+  problem_run(&one);
+  problem_run(&two);
   CHECK(one.solver.updates <= two.solver.updates);
   CHECK(memcmp(one.v, two.v, sizeof one.v) == 0);
 }

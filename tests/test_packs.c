@@ -231,7 +231,7 @@ TEST(impulses_are_what_the_rows_ask_for)
     problem_make(&one, seed, 0.3, 20000);
     problem_link(&one, hapi_pack_work_best());
     rows_ready(&one, hapi_contact_ready, hapi_row_ready);
-    hapi_solver_run(&one.solver);
+    problem_run(&one);
     CHECK(one.solver.packs.count > 0);
     CHECK(one.solver.packs.loose_rows < one.solver.row_count / 4);
     CHECK_SAY(rows_miss(&one) < 1e-10, "%g", rows_miss(&one));
@@ -278,7 +278,8 @@ TEST(what_packs_leave_undone_adds_no_energy)
       }
       rows_ready(p, hapi_contact_ready, hapi_row_ready);
       double apart;
-      hapi_solver_run(&p->solver);
+      problem_run(p);
+      p->solver.packs.ahead = packed; /* the rows have them as well, for what is measured here */
       CHECK(packed == (p->solver.packs.count > 0));
       bool gives = energy_beyond(p, &apart) > 0.0 && p->solver.residual > HAPI_UNSOLVED;
       hapi_solver_calm(&p->solver);
@@ -304,7 +305,7 @@ TEST(rows_one_by_one_end_there_too)
       problem_make(p, seed, 0.0, 20000);
       problem_link(p, packed ? hapi_pack_work_best() : NULL);
       rows_ready(p, hapi_contact_ready, hapi_row_ready);
-      hapi_solver_run(&p->solver);
+      problem_run(p);
     }
     CHECK(one.solver.packs.count > 0 && two.solver.packs.count == 0);
     for (uint32_t i = 0; i < BODIES; ++i) {
@@ -340,7 +341,7 @@ TEST(packs_go_the_way_of_rows_one_by_one)
       p->solver.row_count = count;
       problem_link(p, packed ? hapi_pack_work_best() : NULL);
       rows_ready(p, hapi_contact_ready, hapi_row_ready);
-      hapi_solver_run(&p->solver);
+      problem_run(p);
     }
     CHECK(one.solver.packs.count > 0 && one.solver.packs.loose_rows == 0);
     CHECK(two.solver.packs.count == 0 && one.solver.sweeps == two.solver.sweeps);
@@ -366,7 +367,7 @@ TEST(momentum_is_handed_on)
   }
   problem_link(&one, hapi_pack_work_best());
   rows_ready(&one, hapi_contact_ready, hapi_row_ready);
-  hapi_solver_run(&one.solver);
+  problem_run(&one);
   CHECK(one.solver.packs.count > 0);
   for (uint32_t i = 1; i < BODIES; ++i) {
     for (int k = 0; k < 3 && mass[i] > 0.0; ++k) {
@@ -409,8 +410,8 @@ TEST(pairs_and_plain_c_have_the_same_bits)
       rows_ready(&one, hapi_contact_ready, hapi_row_ready);
       rows_ready(&two, plain ? plain_hapi_contact_ready : hapi_contact_ready,
                  plain ? plain_hapi_row_ready : hapi_row_ready);
-      hapi_solver_run(&one.solver);
-      (plain ? plain_hapi_solver_run : hapi_solver_run)(&two.solver);
+      problem_run(&one);
+      problem_run_by(&two, plain ? plain_hapi_solver_run : hapi_solver_run);
       same_bits();
     }
   }
@@ -421,6 +422,12 @@ enum {
   SOME_GO_ON,
   ALL_ARE_MADE
 };
+
+/* Of a contact, whether its rows are made anew. */
+static bool is_made(uint32_t first, int what)
+{
+  return what == ALL_ARE_MADE || (what == SOME_GO_ON && first % 4 == 0);
+}
 
 static void next_tick(problem *p, int what)
 {
@@ -433,7 +440,7 @@ static void next_tick(problem *p, int what)
     p->rows[i].target += 1e-3 * (i % 5);
     if (!triple) {
       hapi_row_ready(&p->solver, i);
-    } else if (what == ALL_ARE_MADE || (what == SOME_GO_ON && i % 4 == 0)) {
+    } else if (is_made(i, what)) {
       hapi_contact_ready(&p->solver, i, 3, true);
     } else {
       hapi_contact_again(&p->solver, i, 3);
@@ -442,23 +449,120 @@ static void next_tick(problem *p, int what)
   }
 }
 
+#define DRIVEN 3u /* body */
+
+/* Rows by which it moves others, and is moved by none. */
+static void partner_is_driven(problem *p)
+{
+  for (uint32_t i = 0; i < p->solver.row_count; ++i) {
+    if (p->rows[i].b == DRIVEN) {
+      memset(p->rows[i].bb, 0, sizeof p->rows[i].bb);
+    }
+  }
+}
+
 /* Some rows, or none, are made anew in each tick, others go on. */
 TEST(what_is_kept_is_what_would_be_made)
 {
-  for (int what = ALL_GO_ON; what <= SOME_GO_ON; ++what) {
+  for (int turn = 0; turn < 4; ++turn) {
+    int what = turn % 2 == 0 ? ALL_GO_ON : SOME_GO_ON;
     problem_make(&one, 5, 0.4, 10);
     problem_make(&two, 5, 0.4, 10);
     problem_link(&one, hapi_pack_work_best());
     problem_link(&two, hapi_pack_work_best());
+    if (turn >= 2) {
+      partner_is_driven(&one);
+      partner_is_driven(&two);
+    }
     rows_ready(&one, hapi_contact_ready, hapi_row_ready);
     rows_ready(&two, hapi_contact_ready, hapi_row_ready);
     for (int tick = 0; tick < 5; ++tick) {
       hapi_packs_forget(&two.solver.packs);
-      hapi_solver_run(&one.solver);
-      hapi_solver_run(&two.solver);
+      problem_run(&one);
+      problem_run(&two);
       same_bits();
+      one.free_v[DRIVEN][tick % 3] = two.free_v[DRIVEN][tick % 3] = 0.01 * tick;
       next_tick(&one, what);
       next_tick(&two, what);
+    }
+  }
+}
+
+/* N s, of all rows, wherever they are. */
+static void impulses_get(const problem *p, double out[])
+{
+  const hapi_packs *packs = &p->solver.packs;
+  for (uint32_t i = 0; i < p->solver.row_count; ++i) {
+    out[i] = p->rows[i].impulse;
+  }
+  for (uint32_t i = 0; packs->ahead && i < packs->packable_count; ++i) {
+    uint32_t row = packs->packables[i].row;
+    hapi_impulses from = hapi_packs_impulses(packs, i, &p->rows[row]);
+    for (size_t k = 0; k < 3; ++k) {
+      out[row + k] = from.of[k * from.step];
+    }
+  }
+}
+
+/* The first contact goes, and those after it move up; the rows that moved are told their impulses.
+ */
+static void rows_move_up(problem *p, const double impulses[])
+{
+  uint32_t count = p->solver.row_count -= 3;
+  memmove(p->rows, p->rows + 3, count * sizeof *p->rows);
+  for (uint32_t i = 0; i < count; ++i) {
+    p->rows[i].normal -= p->rows[i].normal < 0 ? 0 : 3;
+    p->rows[i].impulse = impulses[3 + i];
+  }
+  hapi_contact_moved(&p->solver);
+}
+
+enum {
+  NOTHING_CHANGES,
+  SOME_ARE_MADE,
+  ONE_RUN_WITHOUT_PACKS,
+  ROWS_MOVE_UP,
+  LAST_CONTACT_GOES,
+  PACKS_CHANGE_COUNT
+};
+
+/* One leaves the impulses of many runs in its packs, whatever comes between them; the other one has
+ * them in its rows after each. */
+TEST(impulses_that_stay_in_packs_are_not_lost)
+{
+  static double in_packs[ROWS];
+  static double in_rows[ROWS];
+  for (int change = NOTHING_CHANGES; change < PACKS_CHANGE_COUNT; ++change) {
+    problem_make(&one, 6, 0.4, 10);
+    problem_make(&two, 6, 0.4, 10);
+    problem_link(&one, hapi_pack_work_best());
+    problem_link(&two, hapi_pack_work_best());
+    rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+    rows_ready(&two, hapi_contact_ready, hapi_row_ready);
+    for (int tick = 0; tick < 6; ++tick) {
+      hapi_solver_run(&one.solver);
+      problem_run(&two);
+      CHECK(one.solver.packs.ahead == (one.solver.packs.count > 0) && !two.solver.packs.ahead);
+      CHECK(memcmp(one.v, two.v, sizeof one.v) == 0);
+      impulses_get(&one, in_packs);
+      impulses_get(&two, in_rows);
+      CHECK(memcmp(in_packs, in_rows, one.solver.row_count * sizeof in_rows[0]) == 0);
+      for (int i = 0; i < 2; ++i) {
+        problem *p = i == 0 ? &one : &two;
+        bool apart = change == ONE_RUN_WITHOUT_PACKS && tick == 2;
+        p->solver.packs.contact_capacity = PACKS;
+        p->solver.packs.body_capacity = apart ? 1 : BODIES;
+        if (change == ROWS_MOVE_UP && tick % 2 == 0) {
+          rows_move_up(p, i == 0 ? in_packs : in_rows);
+        }
+        p->solver.row_count -= change == LAST_CONTACT_GOES && tick == 3 ? OTHERS : 0;
+        for (uint32_t k = 0; change == SOME_ARE_MADE && k < p->solver.row_count; ++k) {
+          hapi_row *row = &p->rows[k];
+          uint32_t first = row->normal < 0 ? k : (uint32_t)row->normal;
+          row->impulse = is_made(first, SOME_GO_ON) ? in_rows[k] : row->impulse;
+        }
+        next_tick(p, change == SOME_ARE_MADE ? SOME_GO_ON : ALL_GO_ON);
+      }
     }
   }
 }
@@ -492,17 +596,17 @@ TEST(a_contact_that_goes_is_in_no_pack)
     for (int i = 0; i < 2; ++i) {
       problem *p = i == 0 ? &one : &two;
       rows_ready(p, hapi_contact_ready, hapi_row_ready);
-      hapi_solver_run(&p->solver);
+      problem_run(p);
       next_tick(p, ALL_GO_ON);
-      hapi_solver_run(&p->solver);
+      problem_run(p);
       uint32_t last = last_contact(p);
       p->solver.row_count = others ? last + 3 : last;
       rows_become_others(p, last);
       next_tick(p, ALL_GO_ON);
     }
     hapi_packs_forget(&two.solver.packs);
-    hapi_solver_run(&one.solver);
-    hapi_solver_run(&two.solver);
+    problem_run(&one);
+    problem_run(&two);
     same_bits();
   }
 }
@@ -527,7 +631,7 @@ TEST(packs_that_no_longer_hold_are_made_anew)
     problem_link(&one, hapi_pack_work_best());
     problem_link(&two, hapi_pack_work_best());
     rows_ready(&one, hapi_contact_ready, hapi_row_ready);
-    hapi_solver_run(&one.solver);
+    problem_run(&one);
     memcpy(two.rows, one.rows, sizeof one.rows);
     two.solver.packs.known.made = one.solver.packs.known.made;
     for (int i = 0; i < 2; ++i) {
@@ -541,7 +645,7 @@ TEST(packs_that_no_longer_hold_are_made_anew)
         row_turn_round(&p->rows[8]);
       }
       next_tick(p, ALL_ARE_MADE);
-      hapi_solver_run(&p->solver);
+      problem_run(p);
     }
     same_bits();
   }
@@ -555,7 +659,7 @@ TEST(without_room_rows_stay_loose)
     problem_link(&one, hapi_pack_work_best());
     one.solver.packs.contact_capacity = room;
     rows_ready(&one, hapi_contact_ready, hapi_row_ready);
-    hapi_solver_run(&one.solver);
+    problem_run(&one);
     CHECK(one.solver.packs.contact_count <= room);
     CHECK((one.solver.packs.count > 0) == (room > 0));
     CHECK_SAY(rows_miss(&one) < 1e-10, "%g", rows_miss(&one));
@@ -568,7 +672,7 @@ TEST(what_is_no_number_shows)
   problem_link(&one, hapi_pack_work_best());
   one.v[5][2] = one.free_v[5][2] = NAN;
   rows_ready(&one, hapi_contact_ready, hapi_row_ready);
-  hapi_solver_run(&one.solver);
+  problem_run(&one);
   CHECK(one.solver.residual == HUGE_VAL);
 }
 
@@ -591,7 +695,7 @@ TEST(a_high_stack_is_in_no_pack)
     problem_link(&one, hapi_pack_work_best());
     one.solver.packs.contact_capacity = PACKS;
     rows_ready(&one, hapi_contact_ready, hapi_row_ready);
-    hapi_solver_run(&one.solver);
+    problem_run(&one);
     CHECK((one.solver.packs.count > 0) == (height == 8));
   }
 }

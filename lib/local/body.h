@@ -65,8 +65,6 @@ typedef struct hapi_body_stay {
   double most_way;  /* m, of each component, before it ends */
   double most_turn; /* rad, likewise */
   double moved[6];  /* m, rad about world axes, from that pose to the one of this tick */
-  double way;       /* m, sum of the sizes of its linear components */
-  double turn;      /* rad, likewise of the others */
   double speed;     /* m/s, sum of the components' sizes */
   double spin;      /* rad/s, likewise */
   hapi_body_still still;

@@ -40,11 +40,13 @@ static inline void hapi_stay_end(hapi_local_body *body)
   body->stay.number = HAPI_STAY_UNKNOWN;
 }
 
-/* m along j since the stay began. */
-static inline double hapi_stay_moved(const hapi_local_body *body, const double j[6])
+/* m along a row of the Jacobian since the stay began: its linear and angular part. */
+static inline double hapi_stay_moved(const hapi_local_body *body, const double linear[3],
+                                     const double angular[3])
 {
-  return body == NULL ? 0.0
-                      : hapi_v3_dot(j, body->stay.moved) + hapi_v3_dot(j + 3, body->stay.moved + 3);
+  return body == NULL
+             ? 0.0
+             : hapi_v3_dot(linear, body->stay.moved) + hapi_v3_dot(angular, body->stay.moved + 3);
 }
 
 /* rad, of each component. The trace of the inertia is twice the mass times the mean square of the
@@ -88,19 +90,6 @@ static inline bool hapi_stay_measure(const hapi_body_stay *stay, const hap_pose 
          sum == sum;
 }
 
-static inline void hapi_stay_sum(hapi_body_stay *io)
-{
-  const double *m = io->moved;
-  io->way = fabs(m[0]) + fabs(m[1]) + fabs(m[2]);
-  io->turn = fabs(m[3]) + fabs(m[4]) + fabs(m[5]);
-}
-
-/* m, more than what is in reach of the centre has moved along any direction since then. */
-static inline double hapi_stay_most(const hapi_local_body *body, double reach)
-{
-  return body == NULL ? 0.0 : body->stay.way + reach * body->stay.turn;
-}
-
 /* At the begin of a tick, after row, flags, pose and twist. */
 static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
 {
@@ -112,7 +101,6 @@ static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
   stay->spin = fabs(w[0]) + fabs(w[1]) + fabs(w[2]);
   if (stay->number != HAPI_STAY_UNKNOWN && stay->flags == flags && stay->row == body->row &&
       stay->waiting == body->waiting && hapi_stay_measure(stay, &body->pose, stay->moved)) {
-    hapi_stay_sum(stay);
     return;
   }
   stay->number = HAPI_STAY_STATIC + ++bodies->stays;
@@ -123,7 +111,6 @@ static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
   stay->most_way = bodies->exact ? HAPI_STAY_SLOW_WAY : HAPI_STAY_WAY;
   stay->most_turn = bodies->exact ? HAPI_STAY_SLOW_TURN : hapi_stay_turn(body);
   memset(stay->moved, 0, sizeof stay->moved);
-  stay->way = stay->turn = 0.0;
 }
 
 #endif

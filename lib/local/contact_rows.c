@@ -387,14 +387,19 @@ static double reach_of(const hapi_local_body *body, const double point[3])
   return fabs(arm[0]) + fabs(arm[1]) + fabs(arm[2]);
 }
 
-/* m: how much wider the gap of kept rows has become since the stays of the bodies began. */
+/* m: how much wider the gap of kept rows has become since the stays of the bodies began. rows: the
+ * kept ones, which count only where the contact slides over a slope. */
 static double gap_grown(const hapi_contact_kept *kept, const hapi_row *rows,
                         const hapi_local_body *a, const hapi_local_body *b)
 {
-  double grown = hapi_stay_moved(a, rows[0].ja) + hapi_stay_moved(b, rows[0].jb);
+  double opposite[3];
+  hapi_v3_scale(-1.0, kept->normal, opposite);
+  double grown =
+      hapi_stay_moved(a, kept->normal, kept->turn_a) + hapi_stay_moved(b, opposite, kept->turn_b);
   for (int i = 0; kept->slides && i < 2; ++i) {
-    grown +=
-        kept->slope[i] * (hapi_stay_moved(a, rows[1 + i].ja) + hapi_stay_moved(b, rows[1 + i].jb));
+    const hapi_row *row = &rows[1 + i];
+    grown += kept->slope[i] *
+             (hapi_stay_moved(a, row->ja, row->ja + 3) + hapi_stay_moved(b, row->jb, row->jb + 3));
   }
   return grown;
 }
@@ -439,6 +444,9 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
       out->what = normal[i].inverse != 0.0 ? out->what : HAPI_KEPT_NOTHING;
     }
     out->what = keep_slope(c, normal, out) ? out->what : HAPI_KEPT_NOTHING;
+    hapi_v3_copy(c->normal, out->normal);
+    hapi_v3_copy(normal->ja + 3, out->turn_a);
+    hapi_v3_copy(normal->jb + 3, out->turn_b);
     out->gap = FOLLOW_MARGIN + c->gap - gap_grown(out, normal, c->a, c->b);
   }
 }
@@ -455,12 +463,9 @@ static bool still_apart(const hapi_contact_kept *kept, const hapi_local_body *a,
   return kept->gap > OPEN_FLOOR + OPEN_TICKS * period * speed;
 }
 
-static bool impulses_finite(const hapi_row *row, uint32_t count)
+static bool impulses_finite(const hapi_contact_memory *memory)
 {
-  double sum = row[0].impulse;
-  for (uint32_t i = 1; i < count; ++i) {
-    sum += row[i].impulse;
-  }
+  double sum = memory->impulse[0] + memory->impulse[1] + memory->impulse[2];
   return hapi_finite(&sum, 1);
 }
 
@@ -474,56 +479,33 @@ static bool rows_stand(const hapi_rows *rows, const hapi_contact_kept *kept, uin
          !source->pointer && source->count == kept->count;
 }
 
-#define GAP_ROUNDING 1e-12 /* m, more than that of a gap */
-
-/* Whether the rows are where they would come next and ask for what they asked for: then they are
- * not even looked at. */
-static bool rows_stay(const hapi_rows *rows, const placed_contact *c,
-                      const hapi_contact_memory *memory)
+/* Whether rows that stand are where they would come next and ask for what they asked for: then they
+ * are not even looked at. */
+static bool rows_stay(const hapi_rows *rows, const hapi_contact_kept *kept, double gap,
+                      const hapi_tick_facts *facts)
 {
-  const hapi_contact_kept *kept = &memory->kept;
-  double sum = memory->impulse[0] + memory->impulse[1] + memory->impulse[2];
-  double most = hapi_stay_most(c->a, kept->reach_a) + hapi_stay_most(c->b, kept->reach_b);
-  most *= kept->slides ? 1.0 + fabs(kept->slope[0]) + fabs(kept->slope[1]) : 1.0;
-  most += GAP_ROUNDING;
-  return kept->plain && kept->first == rows->solver.row_count && rows_stand(rows, kept, c->index) &&
-         kept->gap + most <= 0.0 && kept->gap - most >= kept->least && hapi_finite(&sum, 1);
+  return kept->plain && !facts->bounces && kept->first == rows->solver.row_count && gap <= 0.0 &&
+         gap >= kept->least;
 }
 
 /* What rows_stay stands for. */
 static bool rows_ask_alike(const hapi_rows *rows, const placed_contact *c,
-                           const hapi_contact_memory *memory)
+                           const hapi_contact_kept *kept)
 {
-  const hapi_row *normal = &rows->solver.rows[memory->kept.first];
-  double gap = memory->kept.gap + gap_grown(&memory->kept, normal, c->a, c->b);
-  bool same = normal->impulse == memory->impulse[0] && normal[1].impulse == memory->impulse[1] &&
-              normal[2].impulse == memory->impulse[2];
-  return same && gap <= 0.0 && -gap - c->surface->layer - PUSH_OUT_SLOP <= 0.0 &&
+  const hapi_row *normal = &rows->solver.rows[kept->first];
+  return -c->gap - c->surface->layer - PUSH_OUT_SLOP <= 0.0 &&
          normal->target == c->surface->motion[2] && normal->drive == normal->target &&
-         !rows->sources[memory->kept.first].pushes_out;
+         !rows->sources[kept->first].pushes_out;
 }
 
-static double turn_of(const double j[6])
-{
-  return fabs(j[3]) + fabs(j[4]) + fabs(j[5]);
-}
-
-/* After the normal was set: whether rows_stay may take it for granted, and how long. */
+/* After the normal was set: whether rows_stay may take it for granted. */
 static void rows_note_plain(const hapi_row *normal, const placed_contact *c,
                             const hapi_tick_facts *facts, hapi_contact_kept *out)
 {
   out->least = -c->surface->layer - PUSH_OUT_SLOP;
   out->plain = normal->triple != 0 && (normal->paired || normal->single) && out->all &&
                c->gap <= 0.0 && c->gap >= out->least && !facts->bounces;
-  if (out->plain) {
-    out->by_mass = normal->triple == HAPI_TRIPLE_BY_MASS;
-    out->reach_a = turn_of(normal->ja);
-    out->reach_b = normal->single ? 0.0 : turn_of(normal->jb);
-    for (int i = 1; out->slides && i < 3; ++i) {
-      out->reach_a = hapi_max(turn_of(normal[i].ja), out->reach_a);
-      out->reach_b = hapi_max(normal->single ? 0.0 : turn_of(normal[i].jb), out->reach_b);
-    }
-  }
+  out->by_mass = normal->triple == HAPI_TRIPLE_BY_MASS;
 }
 
 /* The rows of the tick before again, at the place that comes next; false: they have to be made. */
@@ -533,23 +515,22 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   hapi_solver *solver = &rows->solver;
   hapi_contact_kept *kept = &memory->kept;
   uint32_t first = solver->row_count;
-  const hapi_row *was = &solver->rows[kept->first];
   uint32_t count = kept->count;
   uint8_t parts[3];
-  if (!rows_stand(rows, kept, c->index) || !impulses_finite(was, count)) {
-    return false;
-  }
   HAPI_ASSERT(kept->first + count <= rows->capacity);
-  c->gap = kept->gap + gap_grown(kept, was, c->a, c->b);
   if (c->gap > OPEN_FLOOR || (!kept->all && list_parts(c, memory, parts) != count)) {
     return false;
   }
   if (kept->first > first) {
-    memmove(&solver->rows[first], was, count * sizeof *was);
+    memmove(&solver->rows[first], &solver->rows[kept->first], count * sizeof *solver->rows);
     memmove(&rows->sources[first], &rows->sources[kept->first], count * sizeof *rows->sources);
     for (uint32_t i = 1; i < count; ++i) {
       hapi_row *row = &solver->rows[first + i];
       row->normal = row->normal < 0 ? -1 : (int32_t)first;
+    }
+    for (uint32_t i = 0; i < count; ++i) { /* those of packed rows are not in the rows */
+      HAPI_ASSERT_INDEX(rows->sources[first + i].part, 3);
+      solver->rows[first + i].impulse = memory->impulse[rows->sources[first + i].part];
     }
     kept->first = first;
     hapi_contact_moved(solver);
@@ -587,9 +568,13 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
   if (kept->what == HAPI_KEPT_APART) {
     return still_apart(kept, c.a, c.b, facts->period);
   }
+  if (!rows_stand(rows, kept, index) || !impulses_finite(memory)) {
+    return false;
+  }
   c.surface = &hapi_patches_surfaces(contacts->patches)[kept->surface];
-  if (!facts->bounces && rows_stay(rows, &c, memory)) {
-    HAPI_ASSERT(rows_ask_alike(rows, &c, memory));
+  c.gap = kept->gap + gap_grown(kept, &rows->solver.rows[kept->first], c.a, c.b);
+  if (rows_stay(rows, kept, c.gap, facts)) {
+    HAPI_ASSERT(rows_ask_alike(rows, &c, kept));
     rows->solver.row_count += kept->count;
     rows->kept += kept->count;
     hapi_contact_stands(&rows->solver, kept->by_mass);

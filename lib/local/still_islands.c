@@ -204,7 +204,6 @@ static void body_settle(hapi_local_body *body, uint32_t island, double period)
   memset(&body->twist, 0, sizeof body->twist);
   memset(body->start_twist, 0, sizeof body->start_twist);
   hapi_body_place(body);
-  hapi_stay_sum(stay);
   stay->speed = stay->spin = 0.0;
   stay->still.island = island;
   stay->still.contacts = 0;
@@ -218,11 +217,12 @@ static void body_settle(hapi_local_body *body, uint32_t island, double period)
 static void contact_settle(hapi_body_contacts *contacts, const hapi_rows *rows, uint32_t first)
 {
   const hapi_row_source *source = &rows->sources[first];
-  double *held = contacts->memory[source->contact].held;
-  contacts->still_active += rows->solver.rows[first].impulse > 0.0;
+  hapi_contact_memory *memory = &contacts->memory[source->contact];
+  double *held = memory->held;
+  contacts->still_active += memory->impulse[0] > 0.0;
   hapi_v3_set(held, 0.0, 0.0, 0.0);
   for (uint32_t i = first; i < first + source->count; ++i) {
-    hapi_v3_madd(held, rows->solver.rows[i].impulse, rows->solver.rows[i].ja, held);
+    hapi_v3_madd(held, memory->impulse[rows->sources[i].part], rows->solver.rows[i].ja, held);
   }
 }
 

@@ -297,13 +297,10 @@ void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count)
 {
   hapi_row *r = &solver->rows[first];
   bool moved = !r->paired && !r->single; /* by a partner that does not respond */
-  for (uint32_t i = 0; i < count; ++i) {
-    HAPI_ASSERT(r[i].inverse != 0.0 && r[i].a < solver->body_count);
-    r[i].drive = r[i].target;
-    if (moved) {
-      r[i].drive -= hapi_dot6(r[i].jb, solver->v[r[i].b]);
-    }
+  for (uint32_t i = 0; moved && i < count; ++i) {
+    r[i].drive = r[i].target - hapi_dot6(r[i].jb, solver->v[r[i].b]);
   }
+  r->drive = moved ? r->drive : r->target;
   if (r->triple) {
     if (r->triple == HAPI_TRIPLE_BY_MASS) {
       hapi_packs_note(&solver->packs, first, false);
@@ -779,7 +776,7 @@ void hapi_solver_run(hapi_solver *solver)
   bool tried = dear;
   uint32_t dearest = 0;
   sweep_way way = {0};
-  solver->packs.in_use = solver->packs.stored = false;
+  solver->packs.in_use = false;
   for (uint32_t i = 0; i < rows && !solver->ready; ++i) {
     hapi_row_ready(solver, i);
   }
@@ -853,9 +850,7 @@ void hapi_solver_run(hapi_solver *solver)
     rounds += solver->sweeps >= direct_from;
   }
   if (solver->packs.in_use) {
-    hapi_packs_store(&solver->packs, solver->rows);
-    solver->packs.in_use = false;
-    solver->packs.stored = true;
+    hapi_packs_end(&solver->packs, solver->rows);
   }
   note_vain(solver, dearest);
   check_finite(solver);

@@ -94,7 +94,9 @@ typedef struct hapi_solver {
 #define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*6 + (size_t)(bodies)*600)
 
 /* [haptic] Works in rows, v and work only, with 56 kB of stack; bounded by update_budget whatever
- * the input. A row that cannot be used (not finite, index out of range) gets no impulse. */
+ * the input. A row that cannot be used (not finite, index out of range) gets no impulse. Impulses of
+ * packed contacts stay in the packs: hapi_packs_impulses tells them, hapi_packs_store brings them
+ * to the rows. */
 void hapi_solver_run(hapi_solver *solver);
 
 /* [haptic] After a run. Impulses of an island that could not be solved within the budget may leave
@@ -127,8 +129,9 @@ void hapi_single_ready(hapi_solver *solver, uint32_t index, double response);
  * mass and packs.inverse_inertia. */
 void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, bool by_mass);
 
-/* The same of rows that were ready in the last run, all of use, with the impulses of that run and
- * with another target. */
+/* The same of rows that were ready in the last run, all of use, with the impulses of that run; the
+ * normal has another target. Rows that were in another place then have their impulses, see
+ * hapi_packs_begin. */
 void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count);
 
 /* The same of a triple of which the targets are those of that run as well, and which moves both

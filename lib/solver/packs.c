@@ -35,6 +35,23 @@ static void lane_set_impulses(const hapi_packs *packs, uint32_t place, const hap
   }
 }
 
+static void lane_get_impulses(const hapi_packs *packs, uint32_t place, hapi_row *row)
+{
+  for (int i = 0; i < 3; ++i) {
+    row[i].impulse = packs->impulse[place / HAPI_LANES][i][place % HAPI_LANES];
+  }
+}
+
+/* Of a contact that goes on: only a partner that moves and does not respond changes what frictions
+ * ask for. */
+static void lane_set_drives(const hapi_packs *packs, uint32_t place, const hapi_row *row)
+{
+  int changed = row->paired || row->single ? 1 : 3;
+  for (int i = 0; i < changed; ++i) {
+    packs->contacts[place / HAPI_LANES].drive[i][place % HAPI_LANES] = row[i].drive;
+  }
+}
+
 /* 1/kg, exactly as in the rows: from the largest part of the direction. */
 static double inverse_mass(const double j[6], const double b[6])
 {
@@ -325,7 +342,7 @@ static void loose_find(hapi_packs *packs, uint32_t row_count)
   loose_add(packs, begin, row_count);
 }
 
-/* What was made anew. */
+/* What was made anew, and all impulses where the rows have them. */
 static void unit_fill(const hapi_packs *packs, const hapi_row *rows, const hapi_pack_unit *unit)
 {
   hapi_packable *first = &packs->packables[unit->first];
@@ -333,12 +350,12 @@ static void unit_fill(const hapi_packs *packs, const hapi_row *rows, const hapi_
   bool made = false;
   for (uint32_t i = 0; i < unit->count; ++i) {
     const hapi_row *row = &rows[first[i].row];
-    if (first[i].made == row->made) {
-      lane_set_impulses(packs, first[i].place, row);
-    } else {
+    if (first[i].made != row->made) {
       first[i].made = row->made;
       contact_fill(packs, first[i].place, row);
       made = true;
+    } else if (!packs->ahead) {
+      lane_set_impulses(packs, first[i].place, row);
     }
   }
   if (made) {
@@ -431,7 +448,7 @@ static bool is_alike(const hapi_packs *packs, const hapi_row *rows)
     const hapi_row *row = &rows[packs->packables[i].row];
     for (int k = 0; packs->packables[i].place != HAPI_NO_PLACE && k < 3; ++k) {
       same = same && packs->contacts[at].drive[k][lane] == row[k].drive &&
-             packs->impulse[at][k][lane] == row[k].impulse;
+             (packs->ahead || packs->impulse[at][k][lane] == row[k].impulse);
     }
   }
   return same;
@@ -459,7 +476,7 @@ static bool packs_take_news(hapi_packs *packs, const hapi_row *rows, uint32_t ro
       unit_fill(packs, rows, &packs->units[packable->unit]);
       made = true;
     } else if (packable->place != HAPI_NO_PLACE) {
-      lane_set_impulses(packs, packable->place, &rows[packable->row]);
+      lane_set_drives(packs, packable->place, &rows[packable->row]);
     }
   }
   if (made) {
@@ -485,16 +502,29 @@ static void packs_know(hapi_packs *packs)
   packs->known.news = 0;
 }
 
-bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
-                      uint32_t body_count)
+/* To the rows that are where they were; others may have been written over them. */
+static void packs_give_back(hapi_packs *packs, hapi_row *rows)
 {
-  if (packs->work == NULL || body_count > packs->body_capacity || row_count < 3 * PACKABLE_LEAST) {
-    packs->count = packs->height = 0;
-    return false;
+  for (uint32_t i = 0; packs->ahead && i < packs->packable_count; ++i) {
+    const hapi_packable *packable = &packs->packables[i];
+    hapi_row *row = &rows[packable->row];
+    if (packable->place != HAPI_NO_PLACE && is_packable(row) && row->made == packable->made) {
+      lane_get_impulses(packs, packable->place, row);
+    }
   }
+  packs->ahead = false;
+}
+
+bool hapi_packs_begin(hapi_packs *packs, hapi_row *rows, uint32_t row_count, uint32_t body_count)
+{
   if (packs_take_news(packs, rows, row_count, body_count)) {
     packs_know(packs);
     return true;
+  }
+  packs_give_back(packs, rows);
+  if (packs->work == NULL || body_count > packs->body_capacity || row_count < 3 * PACKABLE_LEAST) {
+    packs->count = packs->height = 0;
+    return false;
   }
   if (packs_stand(packs, row_count, body_count)) {
     packs_set_impulses(packs, rows);
@@ -528,15 +558,14 @@ bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_coun
   return true;
 }
 
-void hapi_packs_store(const hapi_packs *packs, hapi_row *rows)
+void hapi_packs_store(hapi_packs *packs, hapi_row *rows)
 {
   for (uint32_t i = 0; i < packs->packable_count; ++i) {
-    const hapi_packable *packable = &packs->packables[i];
-    for (int k = 0; packable->place != HAPI_NO_PLACE && k < 3; ++k) {
-      rows[packable->row + (uint32_t)k].impulse =
-          packs->impulse[packable->place / HAPI_LANES][k][packable->place % HAPI_LANES];
+    if (packs->packables[i].place != HAPI_NO_PLACE) {
+      lane_get_impulses(packs, packs->packables[i].place, &rows[packs->packables[i].row]);
     }
   }
+  packs->ahead = false;
 }
 
 void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows)
@@ -544,9 +573,20 @@ void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows)
   packs_set_impulses(packs, rows);
 }
 
+void hapi_packs_end(hapi_packs *packs, hapi_row *rows)
+{
+  packs->in_use = false;
+  packs->ahead = true;
+  for (uint32_t i = 0; HAPI_ASSERTS && i < packs->packable_count; ++i) {
+    for (int k = 0; packs->packables[i].place != HAPI_NO_PLACE && k < 3; ++k) {
+      rows[packs->packables[i].row + (uint32_t)k].impulse = NAN; /* whoever asks is found out */
+    }
+  }
+}
+
 void hapi_packs_forget(hapi_packs *packs)
 {
   packs->count = packs->contact_count = packs->packable_count = 0;
-  packs->known.alike = false;
+  packs->known.alike = packs->ahead = false;
   packs->loose_count = packs->loose_rows = packs->known.row_count = packs->known.body_count = 0;
 }

@@ -163,8 +163,8 @@ typedef struct hapi_packs {
   uint32_t loose_count;
   uint32_t loose_rows;
   uint32_t height; /* the highest level; 0: not known */
-  bool in_use;     /* the impulses of packed rows are here */
-  bool stored;     /* they were, and the rows have them as well */
+  bool in_use;     /* in a run: the impulses of packed rows are here */
+  bool ahead;      /* after it: they are still here, and the rows have those from before */
   hapi_packed_rows known;
 } hapi_packs;
 
@@ -172,14 +172,34 @@ extern const hapi_pack_work hapi_pack_work_pairs;       /* on every processor */
 extern const hapi_pack_work *const hapi_pack_work_avx2; /* NULL: not built */
 
 /* The packs of these rows, with their impulses; those of the last call stay where they hold.
- * False: nothing is packed. */
-bool hapi_packs_begin(hapi_packs *packs, const hapi_row *rows, uint32_t row_count,
-                      uint32_t body_count);
+ * False: nothing is packed. Rows that are in another place than at the last call have their
+ * impulses; of others those in the packs count where they are ahead. */
+bool hapi_packs_begin(hapi_packs *packs, hapi_row *rows, uint32_t row_count, uint32_t body_count);
 /* The impulses to the rows, and back. */
-void hapi_packs_store(const hapi_packs *packs, hapi_row *rows);
+void hapi_packs_store(hapi_packs *packs, hapi_row *rows);
 void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows);
+/* A run ends: the impulses stay in the packs, and the rows are not to be asked for them. */
+void hapi_packs_end(hapi_packs *packs, hapi_row *rows);
 /* Nothing is known of any rows. */
 void hapi_packs_forget(hapi_packs *packs);
+
+/* Of the three rows of a contact, N s: `step` doubles apart. */
+typedef struct hapi_impulses {
+  const double *of;
+  size_t step;
+} hapi_impulses;
+
+/* After a run. which: index into packables; row: the normal's, of the same contact. */
+static inline hapi_impulses hapi_packs_impulses(const hapi_packs *packs, uint32_t which,
+                                                const hapi_row *row)
+{
+  if (packs->ahead && which < packs->packable_count &&
+      packs->packables[which].place != HAPI_NO_PLACE) {
+    uint32_t place = packs->packables[which].place;
+    return (hapi_impulses){&packs->impulse[place / HAPI_LANES][0][place % HAPI_LANES], HAPI_LANES};
+  }
+  return (hapi_impulses){&row->impulse, sizeof *row / sizeof(double)};
+}
 
 static inline void hapi_packs_add_news(hapi_packs *packs, hapi_pack_news news)
 {

@@ -135,7 +135,10 @@ void hapi_solver_calm(hapi_solver *solver)
   if (solver->row_count == 0 || solver->residual < HAPI_UNSOLVED) {
     return;
   }
-  solver->packs.in_use = solver->packs.stored;
+  if (solver->packs.ahead) {
+    hapi_packs_store(&solver->packs, solver->rows);
+    solver->packs.in_use = true;
+  }
   solver->packs.known.alike = false; /* the last shortening changes rows alone */
   find_islands(solver, &r);
   if (rays_measure(solver, &r)) {

@@ -314,54 +314,55 @@ static void account_pointer(hapi_bodies *bodies, const hapi_row *row, hapi_local
 }
 
 /* Of a row with something that the loop does not own. observes: its work is asked for. */
-static void account_row(hapi_bodies *bodies, const hapi_solver *solver, const hapi_row *row,
-                        const hapi_row_source *source, bool observes)
+static void account_row(hapi_bodies *bodies, const hapi_rows *rows, uint32_t index, double impulse,
+                        bool observes)
 {
-  hapi_local_body *a = hapi_bodies_at(bodies, source->body_a);
-  hapi_local_body *b = hapi_bodies_at(bodies, source->body_b);
+  const hapi_row *row = &rows->solver.rows[index];
+  hapi_local_body *a = hapi_bodies_at(bodies, rows->sources[index].body_a);
+  hapi_local_body *b = hapi_bodies_at(bodies, rows->sources[index].body_b);
   if (observes) {
     bodies->given +=
-        work_on(a, solver, row->ja, row->impulse) + work_on(b, solver, row->jb, row->impulse);
+        work_on(a, &rows->solver, row->ja, impulse) + work_on(b, &rows->solver, row->jb, impulse);
   }
-  give_outside(a, row->ja, row->impulse);
-  give_outside(b, row->jb, row->impulse);
+  give_outside(a, row->ja, impulse);
+  give_outside(b, row->jb, impulse);
   if (hapi_body_is_owned(a) && is_outside(b)) {
-    hapi_v3_madd(bodies->owned_impulse, row->impulse, row->ja, bodies->owned_impulse);
+    hapi_v3_madd(bodies->owned_impulse, impulse, row->ja, bodies->owned_impulse);
   }
   if (hapi_body_is_owned(b) && is_outside(a)) {
-    hapi_v3_madd(bodies->owned_impulse, row->impulse, row->jb, bodies->owned_impulse);
+    hapi_v3_madd(bodies->owned_impulse, impulse, row->jb, bodies->owned_impulse);
   }
 }
 
 /* Of the rows of a contact, from its first one on; returns how many. */
 static inline uint32_t account_contact(const hapi_rows *rows, hapi_bodies *bodies,
-                                       hapi_body_contacts *contacts, uint32_t first, bool observes)
+                                       hapi_body_contacts *contacts, uint32_t first,
+                                       hapi_impulses from, bool observes)
 {
-  const hapi_row *row = &rows->solver.rows[first];
   const hapi_row_source *source = &rows->sources[first];
   HAPI_ASSERT_INDEX(source->contact, contacts->memory_count);
   HAPI_ASSERT(source->part == 0 && source->count > 0);
   double *impulse = contacts->memory[source->contact].impulse;
-  bool pushes = row->impulse != 0.0;
-  impulse[0] = row->impulse;
+  bool pushes = from.of[0] != 0.0;
+  impulse[0] = from.of[0];
   if (source->count == 3) { /* nearly all */
     HAPI_ASSERT(source[1].part == 1 && source[2].part == 2);
-    impulse[1] = row[1].impulse;
-    impulse[2] = row[2].impulse;
-    pushes = pushes || row[1].impulse != 0.0 || row[2].impulse != 0.0;
+    impulse[1] = from.of[from.step];
+    impulse[2] = from.of[2 * from.step];
+    pushes = pushes || impulse[1] != 0.0 || impulse[2] != 0.0;
   } else if (source->count == 2) {
     HAPI_ASSERT_INDEX(source[1].part, 3);
-    impulse[source[1].part] = row[1].impulse;
-    pushes = pushes || row[1].impulse != 0.0;
+    impulse[source[1].part] = from.of[from.step];
+    pushes = pushes || from.of[from.step] != 0.0;
   }
-  contacts->active += row->impulse > 0.0;
+  contacts->active += impulse[0] > 0.0;
   if (pushes) {
     body_touch(hapi_bodies_at(bodies, source->body_a));
     body_touch(hapi_bodies_at(bodies, source->body_b));
   }
   for (uint32_t i = 0; source->gives && i < source->count; ++i) {
-    if (row[i].impulse != 0.0) {
-      account_row(bodies, &rows->solver, &row[i], source, observes);
+    if (from.of[i * from.step] != 0.0) {
+      account_row(bodies, rows, first + i, from.of[i * from.step], observes);
     }
   }
   return source->count;
@@ -373,13 +374,21 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
                          const hapi_joints *joints, bool observes)
 {
   const hapi_solver *solver = &rows->solver;
+  const hapi_packs *packs = &solver->packs;
+  uint32_t which = 0; /* of the packables, which are in the order of the rows */
   contacts->active = contacts->still_active;
   HAPI_ASSERT(solver->row_count <= rows->capacity);
   for (uint32_t i = 0; i < solver->row_count;) {
     const hapi_row *row = &solver->rows[i];
     const hapi_row_source *source = &rows->sources[i];
     if (!source->pointer && !source->joint) {
-      i += account_contact(rows, bodies, contacts, i, observes);
+      while (packs->ahead && which < packs->packable_count && packs->packables[which].row < i) {
+        ++which;
+      }
+      bool packed =
+          packs->ahead && which < packs->packable_count && packs->packables[which].row == i;
+      hapi_impulses from = hapi_packs_impulses(packs, packed ? which : HAPI_NO_PACKABLE, row);
+      i += account_contact(rows, bodies, contacts, i, from, observes);
       continue;
     }
     ++i;
@@ -396,7 +405,7 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
     body_touch(hapi_bodies_at(bodies, source->body_a));
     body_touch(hapi_bodies_at(bodies, source->body_b));
     if (source->gives) {
-      account_row(bodies, solver, row, source, observes);
+      account_row(bodies, rows, i - 1, row->impulse, observes);
     }
   }
 }
@@ -410,7 +419,9 @@ static bool any_pushes_out(const hapi_rows *rows)
     }
   }
   for (uint32_t i = 0; i < rows->lifted_count; ++i) {
-    if (rows->solver.rows[rows->lifted[i].row].impulse > 0.0) {
+    const hapi_row_lifted *at = &rows->lifted[i];
+    const hapi_row *row = &rows->solver.rows[at->row];
+    if (hapi_packs_impulses(&rows->solver.packs, at->which, row).of[0] > 0.0) {
       return true;
     }
   }

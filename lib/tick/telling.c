@@ -587,7 +587,8 @@ static bool contact_force(const hapi_tick *tick, uint32_t index, uint32_t *io_ro
   hapi_v3_set(out, 0.0, 0.0, 0.0);
   if (i < solver->row_count && sources[i].contact == index) {
     for (; i < solver->row_count && sources[i].contact == index; ++i) {
-      hapi_v3_madd(out, per_s * solver->rows[i].impulse, solver->rows[i].ja, out);
+      double impulse = memory->impulse[sources[i].part];
+      hapi_v3_madd(out, per_s * impulse, solver->rows[i].ja, out);
     }
     *io_row = i;
     return true;
