@@ -313,6 +313,14 @@ static void patches_add_pair(hapi_pairs *pairs, uint32_t index, hapi_patches *ou
   hapi_patches_surfaces(out)[out->surface_count++] = pair->surface;
 }
 
+/* But for the surface. */
+static bool is_alike(const hapi_patch_contact *contact, const hapi_patch_contact *other)
+{
+  hapi_patch_contact copy = *other;
+  copy.surface = contact->surface;
+  return memcmp(&copy, contact, sizeof copy) == 0;
+}
+
 static void patches_add(hapi_pairs *pairs, const hapi_pass_body *const bodies[2],
                         const hapi_patch_contact *contact, const hapi_kept_ends *ends,
                         hapi_patches *out)
@@ -321,8 +329,11 @@ static void patches_add(hapi_pairs *pairs, const hapi_pass_body *const bodies[2]
     ends_spot(ends, bodies[0], bodies[1], &pairs->asking->spots[out->contact_count]);
   }
   hapi_patch_contact *c = &hapi_patches_contacts(out)[out->contact_count++];
-  *c = *contact;
+  if (c->number != contact->number) { /* else an older message had it in this place */
+    *c = *contact;
+  }
   c->surface = out->surface_count;
+  HAPI_ASSERT(is_alike(c, contact));
   out->contents = hapi_hash_word(out->contents, c->number);
 }
 

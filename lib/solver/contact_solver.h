@@ -94,9 +94,9 @@ typedef struct hapi_solver {
 #define HAPI_SOLVER_WORK(rows, bodies) ((size_t)(rows)*6 + (size_t)(bodies)*600)
 
 /* [haptic] Works in rows, v and work only, with 56 kB of stack; bounded by update_budget whatever
- * the input. A row that cannot be used (not finite, index out of range) gets no impulse. Impulses of
- * packed contacts stay in the packs: hapi_packs_impulses tells them, hapi_packs_store brings them
- * to the rows. */
+ * the input. A row that cannot be used (not finite, index out of range) gets no impulse. Impulses
+ * of packed contacts stay in the packs: hapi_packs_impulses tells them, hapi_packs_store brings
+ * them to the rows. */
 void hapi_solver_run(hapi_solver *solver);
 
 /* [haptic] After a run. Impulses of an island that could not be solved within the budget may leave
