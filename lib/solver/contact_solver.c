@@ -450,8 +450,7 @@ static void rows_sweep(hapi_solver *solver)
   solver->corrected = sum.energy2;
 }
 
-/* Of a sweep, in row updates: those of all lanes of a pack take as long as two. */
-static uint32_t sweep_cost(const hapi_solver *solver)
+uint32_t hapi_solver_sweep_cost(const hapi_solver *solver)
 {
   return solver->packs.in_use ? solver->packs.loose_rows + 6 * solver->packs.contact_count
                               : solver->row_count;
@@ -645,15 +644,9 @@ void hapi_solver_rebuild(hapi_solver *solver)
 
 void hapi_solver_sweep_on(hapi_solver *solver)
 {
-  if (solver->packs.in_use) {
-    hapi_packs_load(&solver->packs, solver->rows);
-  }
   for (uint32_t i = 0; i < 2 + CALM_UPDATES / solver->row_count; ++i) {
     rows_sweep(solver);
-    solver->updates += sweep_cost(solver);
-  }
-  if (solver->packs.in_use) {
-    hapi_packs_store(&solver->packs, solver->rows);
+    solver->updates += hapi_solver_sweep_cost(solver);
   }
   check_finite(solver);
 }
@@ -699,7 +692,7 @@ static double sweeps_rate(double before2, double before, double now)
 static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t times)
 {
   double share = 1.0;
-  uint32_t sweeps = times * DIRECT_SWEEPS * solver->row_count / sweep_cost(solver);
+  uint32_t sweeps = times * DIRECT_SWEEPS * solver->row_count / hapi_solver_sweep_cost(solver);
   for (uint32_t i = 0; i < sweeps; ++i) {
     share *= rate;
   }
@@ -723,7 +716,7 @@ static uint32_t pairs_solve(hapi_solver *solver, uint64_t left)
     hapi_aggregate_plan(&solver->packs);
     solver->packs.known.anew = false;
   }
-  if (all->count == 0 || left < (uint64_t)all->cost + sweep_cost(solver)) {
+  if (all->count == 0 || left < (uint64_t)all->cost + hapi_solver_sweep_cost(solver)) {
     return 0;
   }
   (void)hapi_aggregate_step(&solver->packs, solver->v);
@@ -792,7 +785,7 @@ void hapi_solver_run(hapi_solver *solver)
     triples_start(solver);
   }
   bool ahead = way_place(solver, &way);
-  uint32_t cost = sweep_cost(solver);
+  uint32_t cost = hapi_solver_sweep_cost(solver);
   uint32_t direct_from = solver->packs.in_use ? PACKED_SWEEPS : 2; /* sweeps */
   double before[2] = {0.0, 0.0}; /* corrected, after the last sweep and the one before */
   double at_pairs = HUGE_VAL;    /* corrected, before the last step of all pairs */

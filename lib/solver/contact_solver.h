@@ -151,7 +151,10 @@ static inline void hapi_contact_moved(hapi_solver *solver)
 
 /* ---- inner: between contact_solver.c, direct_solver.c and solver_calm.c ---- */
 
-/* A few sweeps more, two at least, from the impulses of the rows. */
+/* Of a sweep, in row updates: those of all lanes of a pack take as long as two. */
+uint32_t hapi_solver_sweep_cost(const hapi_solver *solver);
+
+/* A few sweeps more, two at least, from the impulses at hand. */
 void hapi_solver_sweep_on(hapi_solver *solver);
 
 /* The velocities that the impulses make, of rows and packs alike: what was kept along is off by the

@@ -143,6 +143,22 @@ static HAPI_FOUR_INLINE void pair_motion(const hapi_pack *pack, const lanes_pair
   }
 }
 
+/* m/s, what is missing to w + softness impulse = target. */
+static HAPI_FOUR_INLINE void contact_missing(const hapi_pack_contact *c,
+                                             const double (*impulse)[HAPI_LANES],
+                                             const lanes_screw *motion, hapi_four out[3])
+{
+  hapi_four arm[3];
+  hapi_four turned[3];
+  lanes_load3(c->arm, arm);
+  lanes_cross(motion->turn, arm, turned);
+  for (int i = 0; i < 3; ++i) {
+    hapi_four soft = hapi_four_mul(hapi_four_load(c->softness[i]), hapi_four_load(impulse[i]));
+    hapi_four rest = hapi_four_sub(hapi_four_load(c->drive[i]), soft);
+    out[i] = hapi_four_sub(rest, hapi_four_add(motion->linear[i], turned[i]));
+  }
+}
+
 static HAPI_FOUR_INLINE void twist_push(const double mass[HAPI_LANES],
                                         const double (*turn)[HAPI_LANES], const hapi_four linear[3],
                                         const hapi_four moment[3], lanes_twist *io)

@@ -8,6 +8,7 @@
 #include "solver/pack_aggregate.h"
 #include "solver/pack_blocks.h"
 #include "solver/pack_lanes.h"
+#include "solver/pack_rays.h"
 
 typedef struct lanes_corrections {
   hapi_four largest;
@@ -30,22 +31,6 @@ static HAPI_FOUR_INLINE hapi_four cut_friction(hapi_four wanted, hapi_four most,
   hapi_four least = hapi_four_sub(hapi_four_all(0.0), most);
   *io_impulse = hapi_four_min(hapi_four_max(hapi_four_add(old, wanted), least), most);
   return hapi_four_min(hapi_four_max(wanted, hapi_four_sub(least, old)), hapi_four_sub(most, old));
-}
-
-/* m/s, what is missing to w + softness impulse = target. */
-static HAPI_FOUR_INLINE void contact_missing(const hapi_pack_contact *c,
-                                             const double (*impulse)[HAPI_LANES],
-                                             const lanes_screw *motion, hapi_four out[3])
-{
-  hapi_four arm[3];
-  hapi_four turned[3];
-  lanes_load3(c->arm, arm);
-  lanes_cross(motion->turn, arm, turned);
-  for (int i = 0; i < 3; ++i) {
-    hapi_four soft = hapi_four_mul(hapi_four_load(c->softness[i]), hapi_four_load(impulse[i]));
-    hapi_four rest = hapi_four_sub(hapi_four_load(c->drive[i]), soft);
-    out[i] = hapi_four_sub(rest, hapi_four_add(motion->linear[i], turned[i]));
-  }
 }
 
 /* As update_triple in contact_solver.c; d: the changes of the impulses. */

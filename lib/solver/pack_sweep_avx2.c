@@ -16,8 +16,8 @@
 #endif
 #include "solver/pack_sweep.h"
 
-static const hapi_pack_work wide = {packs_couple, packs_push, packs_sweep, way_go_on,
-                                    packs_aggregate};
+static const hapi_pack_work wide = {packs_couple, packs_push,      packs_sweep,
+                                    way_go_on,    packs_aggregate, packs_ray};
 #ifdef __clang__
 #pragma clang attribute pop
 #else

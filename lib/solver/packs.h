@@ -99,6 +99,13 @@ typedef struct hapi_corrections {
   double energy2; /* J, sum of impulse^2 x response */
 } hapi_corrections;
 
+/* By lane, J: see solver_calm.c. */
+typedef struct hapi_pack_ray {
+  double a[HAPI_LANES];
+  double b[HAPI_LANES];
+  double size[HAPI_LANES];
+} hapi_pack_ray;
+
 /* Blocks of so many contacts, at most. */
 #define HAPI_PACK_BLOCKS(contacts) ((size_t)(contacts) * (HAPI_PACK_CONTACTS - 1) / 2 + 1)
 
@@ -117,6 +124,9 @@ typedef struct hapi_pack_work {
   void (*way_go_on)(double *now, double *begin, double *way, double share, size_t count);
   /* The rows of all lanes, HAPI_LANES a pack. */
   void (*aggregate)(const struct hapi_packs *packs, double (*v)[6], struct hapi_aggregate_row *out);
+  /* Of one pack. */
+  void (*ray)(const struct hapi_packs *packs, uint32_t index, double (*free)[6], double (*v)[6],
+              hapi_pack_ray *out);
 } hapi_pack_work;
 
 /* What is known of the rows. */

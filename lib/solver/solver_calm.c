@@ -77,28 +77,49 @@ static bool is_calm(const ray *r)
   return isfinite(r->size) && 0.5 * r->b <= r->a + slack && r->b >= -slack;
 }
 
+static void row_measure(const hapi_solver *solver, const hapi_row *row, ray *io)
+{
+  double without = row->drive - hapi_dot6(row->ja, solver->free[row->a]);
+  without -= row->paired ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
+  double a = row->impulse * without;
+  double b = a - row->impulse * hapi_row_error(solver, row);
+  io->a += a;
+  io->b += b;
+  io->size += fabs(a) + fabs(b);
+}
+
+/* Of the bodies a of its lanes; empty lanes are the static world's, and add nothing. */
+static void pack_measure(const hapi_solver *solver, uint32_t index, rays *io)
+{
+  hapi_pack_ray lanes;
+  solver->packs.work->ray(&solver->packs, index, solver->free, solver->v, &lanes);
+  for (uint32_t lane = 0; lane < HAPI_LANES; ++lane) {
+    ray *of = &io->of[island_of(solver, io, solver->packs.of[index].a[lane] / 6)];
+    of->a += lanes.a[lane];
+    of->b += lanes.b[lane];
+    of->size += lanes.size[lane];
+  }
+}
+
 /* The shares of all islands; whether one is below 1. */
 static bool rays_measure(hapi_solver *solver, rays *r)
 {
   uint32_t count = solver->body_count <= HAPI_SOLVER_BODIES ? solver->body_count : 1;
   bool all_calm = true;
-  solver->updates += 2 * (uint64_t)solver->row_count; /* goes through them twice */
+  solver->updates += 2 * (uint64_t)hapi_solver_sweep_cost(solver); /* goes through all twice */
   hapi_solver_rebuild(solver);
   memset(r->of, 0, count * sizeof r->of[0]);
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    const hapi_row *row = &solver->rows[i];
-    if (row->inverse != 0.0 && row->impulse != 0.0) {
-      ray *of = &r->of[row_island(solver, r, row)];
-      double without = row->drive - hapi_dot6(row->ja, solver->free[row->a]);
-      without -= row->paired ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
-      double a = row->impulse * without;
-      double b = a - row->impulse * hapi_row_error(solver, row);
-      /* cleared above, for every island */
-      /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
-      of->a += a;
-      of->b += b;
-      of->size += fabs(a) + fabs(b);
+  for (uint32_t i = 0; i < hapi_loose_count(solver); ++i) {
+    hapi_loose_rows at = hapi_loose_at(solver, i);
+    for (uint32_t k = at.first; k < at.end; ++k) {
+      const hapi_row *row = &solver->rows[k];
+      if (row->inverse != 0.0 && row->impulse != 0.0) {
+        row_measure(solver, row, &r->of[row_island(solver, r, row)]);
+      }
     }
+  }
+  for (uint32_t i = 0; solver->packs.in_use && i < solver->packs.count; ++i) {
+    pack_measure(solver, i, r);
   }
   for (uint32_t i = 0; i < count; ++i) {
     ray *of = &r->of[i];
@@ -110,19 +131,42 @@ static bool rays_measure(hapi_solver *solver, rays *r)
   return !all_calm;
 }
 
+static double shorten(double share, double impulse)
+{
+  return share > 0.0 ? share * impulse : 0.0;
+}
+
+static void pack_shorten(const hapi_solver *solver, const hapi_pack *pack, const rays *r)
+{
+  for (uint32_t lane = 0; lane < HAPI_LANES; ++lane) {
+    double share = r->of[island_of(solver, r, pack->a[lane] / 6)].share;
+    for (uint32_t i = pack->first; i < pack->first + pack->count; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        double *impulse = &solver->packs.impulse[i][k][lane];
+        *impulse = shorten(share, *impulse);
+      }
+    }
+  }
+}
+
 /* Bounds hold for any share: a friction's goes with its normal's. */
 static void impulses_shorten(hapi_solver *solver, const rays *r)
 {
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
-    hapi_row *row = &solver->rows[i];
-    double share = row->inverse != 0.0 ? r->of[row_island(solver, r, row)].share : 0.0;
-    row->impulse = share > 0.0 ? share * row->impulse : 0.0;
+  for (uint32_t i = 0; i < hapi_loose_count(solver); ++i) {
+    hapi_loose_rows at = hapi_loose_at(solver, i);
+    for (uint32_t k = at.first; k < at.end; ++k) {
+      hapi_row *row = &solver->rows[k];
+      double share = row->inverse != 0.0 ? r->of[row_island(solver, r, row)].share : 0.0;
+      row->impulse = shorten(share, row->impulse);
+    }
+  }
+  for (uint32_t i = 0; solver->packs.in_use && i < solver->packs.count; ++i) {
+    pack_shorten(solver, &solver->packs.of[i], r);
   }
   for (uint32_t i = 0; i < solver->body_count; ++i) {
     double share = r->of[island_of(solver, r, i)].share;
-    for (int k = 0; k < 6; ++k) {
-      double change = share > 0.0 ? share * (solver->v[i][k] - solver->free[i][k]) : 0.0;
-      solver->v[i][k] = solver->free[i][k] + change; /* share 0: whatever v is */
+    for (int k = 0; k < 6; ++k) { /* share 0: whatever v is */
+      solver->v[i][k] = solver->free[i][k] + shorten(share, solver->v[i][k] - solver->free[i][k]);
     }
   }
 }
@@ -135,11 +179,8 @@ void hapi_solver_calm(hapi_solver *solver)
   if (solver->row_count == 0 || solver->residual < HAPI_UNSOLVED) {
     return;
   }
-  if (solver->packs.ahead) {
-    hapi_packs_store(&solver->packs, solver->rows);
-    solver->packs.in_use = true;
-  }
-  solver->packs.known.alike = false; /* the last shortening changes rows alone */
+  solver->packs.in_use = solver->packs.ahead && !solver->apart;
+  solver->packs.known.alike &= solver->packs.in_use; /* else the rows alone are shortened */
   find_islands(solver, &r);
   if (rays_measure(solver, &r)) {
     impulses_shorten(solver, &r);
