@@ -21,7 +21,7 @@
 #define MU_MOST 10.0
 #define PUSH_OUT_MAX 0.2    /* m/s */
 #define PUSH_OUT_SLOP 1e-6  /* m, depth that is left alone */
-#define PUSH_OUT_LEAST 1e-4 /* m/s: less may stay in the velocity, it is not worth a second solve */
+#define PUSH_OUT_LEAST 2e-4 /* m/s: less may stay in the velocity, it is not worth a second solve */
 #define OPEN_FLOOR \
   1e-3 /* m: a contact that is more open than this and than what the bodies'
                                motion closes in a few ticks has no rows */
