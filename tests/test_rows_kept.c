@@ -61,11 +61,16 @@ static void patches_fill(hapi_patches *patches, double mu, uint64_t first_number
                       .max_push = HUGE_VAL};
 }
 
+static double ball; /* m, radius of the box's corners */
+
 static void contacts_adopt(double mu, uint64_t first_number)
 {
   hapi_patches *patches = hapi_exchange_patches_back(f.exchange);
   patches->contents = 0;
   patches_fill(patches, mu, first_number);
+  for (uint32_t i = 0; i < patches->contact_count; ++i) {
+    hapi_patches_contacts(patches)[i].ball_a = ball;
+  }
   hapi_tick_adopt_patches(&f.tick, patches);
 }
 
@@ -111,9 +116,9 @@ static follow_result gap_follow(const double twist[6], double drift, int ticks)
     ticks_run(1);
     REQUIRE(f.tick.rows.solver.row_count == 12);
     for (int i = 0; i < 4; ++i) {
-      double gap = -T * f.rows[3 * i].target;
-      r.error = fmax(r.error, gap - corner_height(&before, i));
-      r.least = fmin(r.least, gap - corner_height(&before, i));
+      double wider = -T * f.rows[3 * i].target - (corner_height(&before, i) - ball);
+      r.error = fmax(r.error, wider);
+      r.least = fmin(r.least, wider);
     }
     bool same = memcmp(was, f.rows[0].ja, sizeof was) == 0;
     r.kept += same;
@@ -229,6 +234,31 @@ TEST(a_body_that_goes_far_in_a_tick_is_placed_in_each)
   CHECK(r.error < 1e-15 && r.least > -1e-15);
 }
 
+/* Past 3e-5 m where a corner is round, past 1e-4 m where all is flat, or what is 4e-3 of the body's
+ * radius of gyration. */
+TEST(what_is_flat_goes_farther_than_what_is_curved)
+{
+  static const double twist[6] = {4.5e-3, 0.0, 0.0, 0.0, 0.0, 0.0};
+  double radius = hapi_v3_norm(corner) / sqrt(3.0); /* of a box, by its half edges */
+  double way = fmax(HAPI_STAY_WAY, fmin(HAPI_STAY_FLAT_SHARE * radius, HAPI_STAY_FLAT_WAY));
+  for (int turn = 0; turn < 2; ++turn) {
+    ball = turn == 0 ? 0.0 : 1e-3;
+    int each = (int)((turn == 0 ? way : HAPI_STAY_WAY) / (T * twist[0])) + 1; /* ticks */
+    follow_result r = gap_follow(twist, 0.03, 600);
+    CHECK_SAY(r.anew == (600 + each - 1) / each, "%d, each %d", r.anew, each);
+    CHECK_SAY(r.error < 3e-9 && r.least > -1e-15, "%g %g", r.error, r.least);
+  }
+  ball = 0.0;
+}
+
+TEST(the_way_goes_by_the_size_of_the_body)
+{
+  CHECK(hapi_stay_flat_way(0.0) == HAPI_STAY_WAY); /* not known */
+  CHECK(hapi_stay_flat_way(1e-3) == HAPI_STAY_WAY);
+  CHECK_NEAR(hapi_stay_flat_way(0.015), 6e-5, 1e-18);
+  CHECK(hapi_stay_flat_way(10.0) == HAPI_STAY_FLAT_WAY);
+}
+
 /* What is slow, and may come to rest, keeps to the short way. */
 TEST(a_slow_body_is_placed_as_often_as_at_accuracy_1)
 {
@@ -262,10 +292,12 @@ TEST(large_bodies_turn_less_before_they_are_placed_anew)
     double radius = sqrt((e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) / 12.0);
     double turn = sqrt(2.0 * HAPI_STAY_BEND / radius);
     turn = fmax(HAPI_STAY_SLOW_TURN, fmin(turn, HAPI_STAY_TURN));
-    CHECK_NEAR(hapi_stay_turn(&body), turn, 1e-9 * turn);
+    CHECK_NEAR(hapi_stay_radius(&body), radius, 1e-9 * radius);
+    CHECK_NEAR(hapi_stay_turn(radius), turn, 1e-9 * turn);
   }
   hapi_local_body none = {.inverse_mass = 0.0};
-  CHECK(hapi_stay_turn(&none) == HAPI_STAY_SLOW_TURN);
+  CHECK(hapi_stay_radius(&none) == 0.0);
+  CHECK(hapi_stay_turn(0.0) == HAPI_STAY_SLOW_TURN);
 }
 
 /* At rest on the floor, pressed by its weight. */

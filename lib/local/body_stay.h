@@ -14,12 +14,16 @@
  * which may be about to rest, the second derivatives stay below 1e-10 m for arms of a metre. */
 #define HAPI_STAY_SLOW_WAY 1e-6  /* m, of each component */
 #define HAPI_STAY_SLOW_TURN 1e-5 /* rad, likewise */
-/* Of others they stay below 1e-8 m. Normals and arms are not turned: a thousandth of friction. */
-#define HAPI_STAY_WAY 3e-5
-#define HAPI_STAY_TURN 3e-4  /* at most */
-#define HAPI_STAY_BEND 1e-9  /* m, of arms as long as the body is large */
-#define HAPI_STAY_SPEED 1e-5 /* m/s, sum of the components' sizes: less is slow */
-#define HAPI_STAY_SPIN 1e-4  /* rad/s, likewise */
+/* Of others they stay below 1e-8 m. Normals and arms are not turned: a thousandth of friction.
+ * Between flat faces a way has no second derivative. There it ends where an arm has become wrong by
+ * as much of it. */
+#define HAPI_STAY_WAY 3e-5        /* m: of what is curved, and at least */
+#define HAPI_STAY_FLAT_WAY 1e-4   /* m, at most */
+#define HAPI_STAY_FLAT_SHARE 4e-3 /* of the body's radius of gyration */
+#define HAPI_STAY_TURN 3e-4       /* at most */
+#define HAPI_STAY_BEND 1e-9       /* m, of arms as long as the body is large */
+#define HAPI_STAY_SPEED 1e-5      /* m/s, sum of the components' sizes: less is slow */
+#define HAPI_STAY_SPIN 1e-4       /* rad/s, likewise */
 
 /* Numbers of stays. Those of bodies are higher. */
 #define HAPI_STAY_UNKNOWN 0u
@@ -49,10 +53,10 @@ static inline double hapi_stay_moved(const hapi_local_body *body, const double l
              : hapi_v3_dot(linear, body->stay.moved) + hapi_v3_dot(angular, body->stay.moved + 3);
 }
 
-/* rad, of each component. The trace of the inertia is twice the mass times the mean square of the
- * distance from the centre, and that of a matrix is the sum of the principal minors of its inverse
- * over the determinant. */
-static inline double hapi_stay_turn(const hapi_local_body *body)
+/* m, about its centre; 0: it does not answer by its mass, or is not placed yet. The trace of the
+ * inertia is twice the mass times the mean square of the distance from the centre, and that of a
+ * matrix is the sum of the principal minors of its inverse over the determinant. */
+static inline double hapi_stay_radius(const hapi_local_body *body)
 {
   const double *i = body->inverse_inertia;
   double minor0 = i[4] * i[8] - i[5] * i[7];
@@ -60,11 +64,29 @@ static inline double hapi_stay_turn(const hapi_local_body *body)
   double det =
       i[0] * minor0 - i[1] * (i[3] * i[8] - i[5] * i[6]) + i[2] * (i[3] * i[7] - i[4] * i[6]);
   double radius2 = 0.5 * body->inverse_mass * minors / det;
-  if (!(det > 0.0) || !(radius2 > 0.0)) {
-    return HAPI_STAY_SLOW_TURN; /* not by its mass, or not placed yet */
-  }
-  double turn = sqrt(2.0 * HAPI_STAY_BEND / sqrt(radius2));
+  return det > 0.0 && radius2 > 0.0 ? sqrt(radius2) : 0.0;
+}
+
+/* rad, of each component. */
+static inline double hapi_stay_turn(double radius)
+{
+  double turn = radius > 0.0 ? sqrt(2.0 * HAPI_STAY_BEND / radius) : 0.0;
   return hapi_max(HAPI_STAY_SLOW_TURN, hapi_min(turn, HAPI_STAY_TURN));
+}
+
+/* m, likewise, while no contact of the body is curved. */
+static inline double hapi_stay_flat_way(double radius)
+{
+  return hapi_max(HAPI_STAY_WAY, hapi_min(HAPI_STAY_FLAT_SHARE * radius, HAPI_STAY_FLAT_WAY));
+}
+
+/* A contact of the body is curved: also the stay that has begun ends sooner. */
+static inline void hapi_stay_curve(hapi_local_body *body)
+{
+  if (body != NULL) {
+    body->stay.curved = true;
+    body->stay.most_way = hapi_min(body->stay.most_way, HAPI_STAY_WAY);
+  }
 }
 
 /* False: too far, or not finite. */
@@ -108,8 +130,10 @@ static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
   stay->row = body->row;
   stay->waiting = body->waiting;
   stay->pose = body->pose;
-  stay->most_way = bodies->exact ? HAPI_STAY_SLOW_WAY : HAPI_STAY_WAY;
-  stay->most_turn = bodies->exact ? HAPI_STAY_SLOW_TURN : hapi_stay_turn(body);
+  double radius = bodies->exact ? 0.0 : hapi_stay_radius(body);
+  double way = stay->curved ? HAPI_STAY_WAY : hapi_stay_flat_way(radius);
+  stay->most_way = bodies->exact ? HAPI_STAY_SLOW_WAY : way;
+  stay->most_turn = bodies->exact ? HAPI_STAY_SLOW_TURN : hapi_stay_turn(radius);
   memset(stay->moved, 0, sizeof stay->moved);
 }
 

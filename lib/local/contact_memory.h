@@ -20,10 +20,10 @@ enum {
 typedef struct hapi_contact_kept {
   uint64_t stay_a;
   uint64_t stay_b;
-  double gap;     /* m, at the poses where the stays began; APART: the least while they last */
+  double gap;     /* m, at the poses where the stays began */
   double reach_a; /* APART: m, by which the body's turn moves the contact, or more */
   double reach_b;
-  double normal[3]; /* ROWS: the normal's row of the Jacobian: a's linear part, b's is opposite; */
+  double normal[3]; /* the normal's row of the Jacobian: a's linear part, b's is opposite; */
   double turn_a[3]; /* and its angular parts. So nothing else of a row is looked at that stays */
   double turn_b[3];
   double slope[2]; /* ROWS: hapi_touch_spot's along the directions of the frictions */

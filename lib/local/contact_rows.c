@@ -366,16 +366,12 @@ void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bo
  * collision sees, and is still held there when the loop gives it back. */
 #define FOLLOW_MARGIN 2e-9
 
-/* Less of a slope is left out: over the way of body_stay.h it is 2e-8 m, and 5e-10 where that is
+/* Less of a slope is left out: over the way of body_stay.h it is 2e-8 m, and 2e-10 where that is
  * short. */
-#define SLOPE_LEAST 5e-4
+#define SLOPE_LEAST 2e-4
 
-/* m, more than a contact may come nearer while its bodies stay: from one end of their ways to the
- * other. */
-static double most_closing(const hapi_contact_kept *kept)
-{
-  return 10.0 * HAPI_STAY_WAY + 5.0 * HAPI_STAY_TURN * (kept->reach_a + kept->reach_b);
-}
+/* m, more than the gap of a contact without rows is off by: slopes, and what is of second order. */
+#define APART_SLACK 5e-5
 
 static double reach_of(const hapi_local_body *body, const double point[3])
 {
@@ -387,8 +383,21 @@ static double reach_of(const hapi_local_body *body, const double point[3])
   return fabs(arm[0]) + fabs(arm[1]) + fabs(arm[2]);
 }
 
-/* m: how much wider the gap of kept rows has become since the stays of the bodies began. rows: the
- * kept ones, which count only where the contact slides over a slope. */
+/* Of a force along the normal, about the body's centre. */
+static void moment_of(const hapi_local_body *body, const double point[3], double sign,
+                      const double normal[3], double out[3])
+{
+  double arm[3];
+  hapi_v3_set(out, 0.0, 0.0, 0.0);
+  if (body != NULL) {
+    hapi_body_arm(body, point, arm);
+    hapi_v3_cross(arm, normal, out);
+    hapi_v3_scale(sign, out, out);
+  }
+}
+
+/* m: how much wider the gap has become since the stays of the bodies began. rows: the kept ones,
+ * which count only where the contact slides over a slope. */
 static double gap_grown(const hapi_contact_kept *kept, const hapi_row *rows,
                         const hapi_local_body *a, const hapi_local_body *b)
 {
@@ -432,7 +441,11 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
   if (what == HAPI_KEPT_APART) {
     out->reach_a = reach_of(c->a, c->point);
     out->reach_b = reach_of(c->b, c->point);
-    out->gap = c->gap - most_closing(out);
+    out->slides = false;
+    hapi_v3_copy(c->normal, out->normal);
+    moment_of(c->a, c->point, 1.0, c->normal, out->turn_a);
+    moment_of(c->b, c->point, -1.0, c->normal, out->turn_b);
+    out->gap = c->gap - APART_SLACK - gap_grown(out, NULL, c->a, c->b);
   } else if (what == HAPI_KEPT_ROWS) {
     const hapi_row *normal = &rows->solver.rows[first];
     out->first = first;
@@ -460,7 +473,8 @@ static bool still_apart(const hapi_contact_kept *kept, const hapi_local_body *a,
                         const hapi_local_body *b, double period)
 {
   double speed = most_speed(a, kept->reach_a) + most_speed(b, kept->reach_b);
-  return kept->gap > OPEN_FLOOR + OPEN_TICKS * period * speed;
+  double gap = kept->gap + gap_grown(kept, NULL, a, b);
+  return gap > OPEN_FLOOR + OPEN_TICKS * period * speed;
 }
 
 static bool impulses_finite(const hapi_contact_memory *memory)
@@ -583,6 +597,13 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
   return rows_go_on(rows, &c, memory, facts, sample);
 }
 
+/* A corner or an edge on a face. The point of crossing edges goes farther than their bodies. */
+static bool is_flat(const hapi_patch_contact *in)
+{
+  return (in->touch == HAPI_TOUCH_FACE_A || in->touch == HAPI_TOUCH_FACE_B) && in->ball_a == 0.0 &&
+         in->ball_b == 0.0 && in->rim_a == 0.0 && in->rim_b == 0.0;
+}
+
 static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies, uint32_t index,
                          hapi_rows *rows, const hapi_tick_facts *facts, hapi_effect_sample *sample)
 {
@@ -596,6 +617,10 @@ static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies
     bool near = is_near(&c, facts->period);
     if (near) {
       add_contact(rows, &c, memory, facts, sample);
+    }
+    if (!is_flat(c.in)) {
+      hapi_stay_curve(c.a);
+      hapi_stay_curve(c.b);
     }
     if (c.follows) {
       contact_keep(rows, &c, near ? HAPI_KEPT_ROWS : HAPI_KEPT_APART, first, &memory->kept);
