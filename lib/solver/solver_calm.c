@@ -131,7 +131,7 @@ static bool rays_measure(hapi_solver *solver, rays *r)
   return !all_calm;
 }
 
-static double shorten(double share, double impulse)
+static double share_of(double share, double impulse)
 {
   return share > 0.0 ? share * impulse : 0.0;
 }
@@ -143,7 +143,7 @@ static void pack_shorten(const hapi_solver *solver, const hapi_pack *pack, const
     for (uint32_t i = pack->first; i < pack->first + pack->count; ++i) {
       for (int k = 0; k < 3; ++k) {
         double *impulse = &solver->packs.impulse[i][k][lane];
-        *impulse = shorten(share, *impulse);
+        *impulse = share_of(share, *impulse);
       }
     }
   }
@@ -157,7 +157,7 @@ static void impulses_shorten(hapi_solver *solver, const rays *r)
     for (uint32_t k = at.first; k < at.end; ++k) {
       hapi_row *row = &solver->rows[k];
       double share = row->inverse != 0.0 ? r->of[row_island(solver, r, row)].share : 0.0;
-      row->impulse = shorten(share, row->impulse);
+      row->impulse = share_of(share, row->impulse);
     }
   }
   for (uint32_t i = 0; solver->packs.in_use && i < solver->packs.count; ++i) {
@@ -166,7 +166,7 @@ static void impulses_shorten(hapi_solver *solver, const rays *r)
   for (uint32_t i = 0; i < solver->body_count; ++i) {
     double share = r->of[island_of(solver, r, i)].share;
     for (int k = 0; k < 6; ++k) { /* share 0: whatever v is */
-      solver->v[i][k] = solver->free[i][k] + shorten(share, solver->v[i][k] - solver->free[i][k]);
+      solver->v[i][k] = solver->free[i][k] + share_of(share, solver->v[i][k] - solver->free[i][k]);
     }
   }
 }
