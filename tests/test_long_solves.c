@@ -7,6 +7,7 @@
 #include "tests/tap.h"
 
 #include "haptic/haptic_internal.h"
+#include "local/body_stay.h"
 #include "session/session_internal.h"
 #include "tests/contact_world.h"
 
@@ -88,10 +89,13 @@ TEST(nothing_is_left_where_all_is_asked_for)
   CHECK(f.bounded == 0 && f.unsolved == 0);
 }
 
-/* Rows go on while their bodies go less than 30 um: 3 ticks of 10 um each, and none of 50. */
+/* Rows go on while their bodies, cubes, go less than so far: one tick of two at 50 um each, and 8 of
+ * 9 at 10. */
 TEST(rows_that_go_on_count_as_kept)
 {
-  CHECK(row_push(0.5, SPEED).kept < 0.1);
-  figures f = row_push(0.5, 0.01);
-  CHECK(f.kept > 0.5 && f.kept < 0.95);
+  double way = hapi_stay_flat_way(0.5 * EDGE);
+  CHECK(way > 5e-5 && way <= 1e-4);
+  CHECK(row_push(0.5, 2.0 * way / 1e-3).kept < 0.1);
+  CHECK_NEAR(row_push(0.5, SPEED).kept, 0.5, 0.05);
+  CHECK_NEAR(row_push(0.5, 0.01).kept, 0.87, 0.05);
 }

@@ -242,7 +242,7 @@ TEST(what_is_flat_goes_farther_than_what_is_curved)
   double radius = hapi_v3_norm(corner) / sqrt(3.0); /* of a box, by its half edges */
   double way = fmax(HAPI_STAY_WAY, fmin(HAPI_STAY_FLAT_SHARE * radius, HAPI_STAY_FLAT_WAY));
   for (int turn = 0; turn < 2; ++turn) {
-    ball = turn == 0 ? 0.0 : 1e-3;
+    ball = turn == 0 ? 0.0 : 0.5 * OPEN;
     int each = (int)((turn == 0 ? way : HAPI_STAY_WAY) / (T * twist[0])) + 1; /* ticks */
     follow_result r = gap_follow(twist, 0.03, 600);
     CHECK_SAY(r.anew == (600 + each - 1) / each, "%d, each %d", r.anew, each);

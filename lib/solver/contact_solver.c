@@ -297,6 +297,7 @@ void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count)
 {
   hapi_row *r = &solver->rows[first];
   bool moved = !r->paired && !r->single; /* by a partner that does not respond */
+  HAPI_ASSERT(r->inverse != 0.0 && r->a < solver->body_count);
   for (uint32_t i = 0; moved && i < count; ++i) {
     r[i].drive = r[i].target - hapi_dot6(r[i].jb, solver->v[r[i].b]);
   }

@@ -83,6 +83,8 @@ static void row_measure(const hapi_solver *solver, const hapi_row *row, ray *io)
   without -= row->paired ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
   double a = row->impulse * without;
   double b = a - row->impulse * hapi_row_error(solver, row);
+  /* rays_measure has cleared it, for every island */
+  /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
   io->a += a;
   io->b += b;
   io->size += fabs(a) + fabs(b);
@@ -95,6 +97,8 @@ static void pack_measure(const hapi_solver *solver, uint32_t index, rays *io)
   solver->packs.work->ray(&solver->packs, index, solver->free, solver->v, &lanes);
   for (uint32_t lane = 0; lane < HAPI_LANES; ++lane) {
     ray *of = &io->of[island_of(solver, io, solver->packs.of[index].a[lane] / 6)];
+    /* likewise */
+    /* NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
     of->a += lanes.a[lane];
     of->b += lanes.b[lane];
     of->size += lanes.size[lane];
