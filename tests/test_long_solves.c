@@ -89,8 +89,8 @@ TEST(nothing_is_left_where_all_is_asked_for)
   CHECK(f.bounded == 0 && f.unsolved == 0);
 }
 
-/* Rows go on while their bodies, cubes, go less than so far: one tick of two at 50 um each, and 8 of
- * 9 at 10. */
+/* Rows go on while their bodies, cubes, go less than so far: in one tick of two at 50 um each, and
+ * in 8 of 9 at 10. */
 TEST(rows_that_go_on_count_as_kept)
 {
   double way = hapi_stay_flat_way(0.5 * EDGE);

@@ -396,15 +396,23 @@ static void moment_of(const hapi_local_body *body, const double point[3], double
   }
 }
 
-/* m: how much wider the gap has become since the stays of the bodies began. rows: the kept ones,
- * which count only where the contact slides over a slope. */
-static double gap_grown(const hapi_contact_kept *kept, const hapi_row *rows,
-                        const hapi_local_body *a, const hapi_local_body *b)
+/* m: how much farther the bodies of a kept contact have gone from each other along the normal since
+ * their stays began. */
+static double normal_grown(const hapi_contact_kept *kept, const hapi_local_body *a,
+                           const hapi_local_body *b)
 {
   double opposite[3];
   hapi_v3_scale(-1.0, kept->normal, opposite);
-  double grown =
-      hapi_stay_moved(a, kept->normal, kept->turn_a) + hapi_stay_moved(b, opposite, kept->turn_b);
+  return hapi_stay_moved(a, kept->normal, kept->turn_a) +
+         hapi_stay_moved(b, opposite, kept->turn_b);
+}
+
+/* m: how much wider the gap of kept rows has become. rows: looked at only where the contact slides
+ * over a slope. */
+static double gap_grown(const hapi_contact_kept *kept, const hapi_row *rows,
+                        const hapi_local_body *a, const hapi_local_body *b)
+{
+  double grown = normal_grown(kept, a, b);
   for (int i = 0; kept->slides && i < 2; ++i) {
     const hapi_row *row = &rows[1 + i];
     grown += kept->slope[i] *
@@ -441,11 +449,10 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
   if (what == HAPI_KEPT_APART) {
     out->reach_a = reach_of(c->a, c->point);
     out->reach_b = reach_of(c->b, c->point);
-    out->slides = false;
     hapi_v3_copy(c->normal, out->normal);
     moment_of(c->a, c->point, 1.0, c->normal, out->turn_a);
     moment_of(c->b, c->point, -1.0, c->normal, out->turn_b);
-    out->gap = c->gap - APART_SLACK - gap_grown(out, NULL, c->a, c->b);
+    out->gap = c->gap - APART_SLACK - normal_grown(out, c->a, c->b);
   } else if (what == HAPI_KEPT_ROWS) {
     const hapi_row *normal = &rows->solver.rows[first];
     out->first = first;
@@ -473,7 +480,7 @@ static bool still_apart(const hapi_contact_kept *kept, const hapi_local_body *a,
                         const hapi_local_body *b, double period)
 {
   double speed = most_speed(a, kept->reach_a) + most_speed(b, kept->reach_b);
-  double gap = kept->gap + gap_grown(kept, NULL, a, b);
+  double gap = kept->gap + normal_grown(kept, a, b);
   return gap > OPEN_FLOOR + OPEN_TICKS * period * speed;
 }
 
