@@ -102,7 +102,6 @@ typedef struct follow_result {
 static follow_result gap_follow(const double twist[6], double drift, int ticks)
 {
   follow_result r = {0.0, 0.0, 0, 0};
-  double was[6] = {0.0};
   set_up();
   f.tick.hashing = false;
   hapi_model_body *body = box_add(MASS);
@@ -120,10 +119,9 @@ static follow_result gap_follow(const double twist[6], double drift, int ticks)
       r.error = fmax(r.error, wider);
       r.least = fmin(r.least, wider);
     }
-    bool same = memcmp(was, f.rows[0].ja, sizeof was) == 0;
-    r.kept += same;
-    r.anew += !same;
-    memcpy(was, f.rows[0].ja, sizeof was);
+    bool kept = f.tick.rows.kept == f.tick.rows.solver.row_count;
+    r.kept += kept;
+    r.anew += !kept;
   }
   return r;
 }
