@@ -263,6 +263,47 @@ static double energy_beyond(const problem *p, double *out_apart)
   return energy;
 }
 
+/* What the calm solve goes by, of each row as solver_calm.c has it. */
+TEST(rays_of_packs_are_those_of_their_rows)
+{
+  problem_make(&one, 3, 0.5, 2);
+  problem_link(&one, hapi_pack_work_best());
+  rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+  problem_run(&one);
+  const hapi_packs *packs = &one.solver.packs;
+  double a = 0.0;
+  double b = 0.0;
+  double size = 0.0;
+  CHECK(packs->count > 0);
+  for (uint32_t i = 0; i < packs->count; ++i) {
+    hapi_pack_ray ray;
+    packs->work->ray(packs, i, one.free_v, one.v, &ray);
+    for (uint32_t lane = 0; lane < HAPI_LANES; ++lane) {
+      a += ray.a[lane];
+      b += ray.b[lane];
+      size += ray.size[lane];
+    }
+  }
+  double size_rows = 0.0;
+  for (uint32_t i = 0; i < packs->packable_count; ++i) {
+    for (uint32_t k = 0; k < 3; ++k) {
+      const hapi_row *row = &one.rows[packs->packables[i].row + k];
+      double before =
+          vector_dot(row->ja, one.free_v[row->a], 6) + vector_dot(row->jb, one.free_v[row->b], 6);
+      double after = vector_dot(row->ja, one.v[row->a], 6) + vector_dot(row->jb, one.v[row->b], 6);
+      double asked = row->impulse * (row->target - before);
+      double made = row->impulse * (after - before + row->softness * row->impulse);
+      CHECK(packs->packables[i].place != HAPI_NO_PLACE);
+      a -= asked;
+      b -= made;
+      size_rows += fabs(asked) + fabs(made);
+    }
+  }
+  CHECK_NEAR(size, size_rows, 1e-9 * size_rows);
+  CHECK_NEAR(a, 0.0, 1e-12 * size_rows);
+  CHECK_NEAR(b, 0.0, 1e-12 * size_rows);
+}
+
 /* Impulses of another load, of which two sweeps make little: what is left of them. */
 TEST(what_packs_leave_undone_adds_no_energy)
 {
