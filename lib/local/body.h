@@ -61,7 +61,7 @@ typedef struct hapi_body_stay {
   uint32_t flags;  /* this and the next three: at its begin */
   uint32_t row;
   bool waiting;
-  bool curved; /* a contact of the body is or was, or one of crossing edges, since it came */
+  bool curved; /* it has or had a contact with a round part, or of crossing edges */
   hap_pose pose;
   double most_way;  /* m, of each component, before it ends */
   double most_turn; /* rad, likewise */

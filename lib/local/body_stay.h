@@ -15,8 +15,8 @@
 #define HAPI_STAY_SLOW_WAY 1e-6  /* m, of each component */
 #define HAPI_STAY_SLOW_TURN 1e-5 /* rad, likewise */
 /* Of others they stay below 1e-8 m. Normals and arms are not turned: a thousandth of friction.
- * Between flat faces a way has no second derivative. There it ends where an arm has become wrong by
- * as much of it. */
+ * A way along or across flat faces has no second derivative. It ends where an arm is wrong by a
+ * share of the body's size. */
 #define HAPI_STAY_WAY 3e-5        /* m: of what is curved, and at least */
 #define HAPI_STAY_FLAT_WAY 1e-4   /* m, at most */
 #define HAPI_STAY_FLAT_SHARE 4e-3 /* of the body's radius of gyration */

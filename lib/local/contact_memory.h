@@ -24,7 +24,7 @@ typedef struct hapi_contact_kept {
   double reach_a; /* APART: m, by which the body's turn moves the contact, or more */
   double reach_b;
   double normal[3]; /* the normal's row of the Jacobian: a's linear part, b's is opposite; */
-  double turn_a[3]; /* and its angular parts. So nothing else of a row is looked at that stays */
+  double turn_a[3]; /* and its angular parts: the gap follows without a look at the row */
   double turn_b[3];
   double slope[2]; /* ROWS: hapi_touch_spot's along the directions of the frictions */
   double least;    /* ROWS: m, this */

@@ -370,8 +370,8 @@ void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bo
  * short. */
 #define SLOPE_LEAST 2e-4
 
-/* m, more than the gap of a contact without rows is off by: the slope of a touch that slides, 0.2 at
- * most, over the ways of both bodies from end to end. */
+/* m, more than the gap of a contact without rows is off by: a touch that slides has a slope of 0.2
+ * at most, over the ways of both bodies from end to end. */
 #define APART_SLACK 2e-4
 
 static double reach_of(const hapi_local_body *body, const double point[3])
