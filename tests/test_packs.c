@@ -277,7 +277,12 @@ TEST(rays_of_packs_are_those_of_their_rows)
   CHECK(packs->count > 0);
   for (uint32_t i = 0; i < packs->count; ++i) {
     hapi_pack_ray ray;
+    hapi_pack_ray by_pairs;
+    hapi_pack_ray plain;
     packs->work->ray(packs, i, one.free_v, one.v, &ray);
+    hapi_pack_work_pairs.ray(packs, i, one.free_v, one.v, &by_pairs);
+    plain_hapi_pack_work_pairs.ray(packs, i, one.free_v, one.v, &plain);
+    CHECK(memcmp(&ray, &by_pairs, sizeof ray) == 0 && memcmp(&ray, &plain, sizeof ray) == 0);
     for (uint32_t lane = 0; lane < HAPI_LANES; ++lane) {
       a += ray.a[lane];
       b += ray.b[lane];
