@@ -15,9 +15,10 @@
 
 #include "base/log.h"
 
-#define PEERS_COLUMNS                                                           \
-  "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode" \
-  ",iterations,peak_n,rest_mm,asleep,repeats,haptic_hz,tick_us,contact_us,physics_us,truth_floor"
+#define PEERS_COLUMNS                                                                             \
+  "engine,world,bodies,physics_hz,us_per_ms,p99_us,force_rel_rms,force_rel_ode"                   \
+  ",iterations,peak_n,rest_mm,asleep,repeats,haptic_hz,tick_us,contact_us,physics_us,truth_floor" \
+  ",force_rel_own"
 
 #define REPEATS 5
 #define REPEATS_QUICK 3
@@ -25,12 +26,13 @@
 #define RATE_HZ_LEAST 100.0
 #define RATE_HZ_MOST 20000.0
 #define TRUTH_ITERATIONS 1000
-#define TRUTH_BOXES_MOST 100 /* larger worlds take a truth too long */
-#define NUDGE 1e-7           /* m: single precision at 1 m still tells it */
-#define APART_TRUTH_BOXES 10 /* nothing but the floor touches the one that the hand meets */
-#define SLEEP_SETTLE_S 0.8   /* until all sleep */
-#define FIRST_WITHIN 0.1     /* of ODE's force while friction holds the box */
-#define REST_MOST 5e-4       /* m, way of a box that nobody touches */
+#define PHYSICS_HZ_MOST 1000.0 /* of a session */
+#define TRUTH_BOXES_MOST 100   /* larger worlds take a truth too long */
+#define NUDGE 1e-7             /* m: single precision at 1 m still tells it */
+#define APART_TRUTH_BOXES 10   /* nothing but the floor touches the one that the hand meets */
+#define SLEEP_SETTLE_S 0.8     /* until all sleep */
+#define FIRST_WITHIN 0.1       /* of ODE's force while friction holds the box */
+#define REST_MOST 5e-4         /* m, way of a box that nobody touches */
 #define CONTESTANTS_MOST 8
 #define SIZES_MOST 8
 #define ROWS_MOST 256
@@ -82,6 +84,7 @@ typedef struct peers_row {
   double parts[3];  /* us a ms: ticks, contact passes, cycles; NaN: of an engine */
   double error;     /* NaN: not known */
   double error_ode; /* likewise */
+  double error_own; /* likewise */
   double floor;     /* of the truth that error is against; NaN: not known */
   double first;     /* at the begin of the touch, of ODE's; NaN: not known */
   size_t asleep;
@@ -151,13 +154,17 @@ static void world_nudge(peer_world *world, double way)
   }
 }
 
-/* Without one there is no force. nudge: m, how far boxes are aside at the begin. */
+/* engine NULL: a session that does all that it can, with physics at the rate of the hand. Where a
+ * truth takes too long there is no force. nudge: m, how far boxes are aside at the begin. */
 static hap_status truth_run(bench *b, const peer_engine *engine, const peers_case *of, double nudge,
                             peers_run *out)
 {
   peer_world world;
   bool apart = strncmp(of->world, "apart", 5) == 0;
-  peer_setting setting = {1.0 / of->haptic_hz, TRUTH_ITERATIONS, false, true};
+  const peer_setting setting = {1.0 / of->haptic_hz, TRUTH_ITERATIONS, false, true};
+  const peers_session_setting whole = {.physics_hz = fmin(of->haptic_hz, PHYSICS_HZ_MOST),
+                                       .haptic_hz = of->haptic_hz,
+                                       .to_the_end = true};
   memset(out, 0, sizeof *out);
   if (!apart && of->bodies > TRUTH_BOXES_MOST) {
     return HAP_OK;
@@ -167,7 +174,8 @@ static hap_status truth_run(bench *b, const peer_engine *engine, const peers_cas
     return bench_fail(b, HAP_ERROR_MEMORY, "no memory for %s", of->world);
   }
   world_nudge(&world, nudge);
-  hap_status status = peers_run_engine(b, engine, &world, &setting, out);
+  hap_status status = engine != NULL ? peers_run_engine(b, engine, &world, &setting, out)
+                                     : peers_run_session(b, &world, &whole, out);
   peer_world_destroy(&world);
   return status;
 }
@@ -193,8 +201,9 @@ static hap_status truth_find(bench *b, const peer_engine *engine, const peers_ca
   return status;
 }
 
+/* session: of sessions, their own. */
 static hap_status row_judge(bench *b, const peer_world *world, const peers_truth *ode,
-                            peers_row *row)
+                            const peers_run *session, peers_row *row)
 {
   const peer_engine *engine = row->who->engine;
   peers_truth own = {{0}};
@@ -211,6 +220,7 @@ static hap_status row_judge(bench *b, const peer_world *world, const peers_truth
     row->floor = own.floor;
     peers_run_free(&own.run);
   }
+  row->error_own = engine == NULL ? peers_run_error(&row->run, session) : row->error;
   return status;
 }
 
@@ -303,6 +313,7 @@ static void row_write(FILE *csv, const peers_row *r)
     number_write(csv, r->parts[k]);
   }
   number_write(csv, r->floor);
+  number_write(csv, r->error_own);
   fputc('\n', csv);
 }
 
@@ -319,16 +330,18 @@ static void row_report(bench *b, const peers_row *r)
 {
   char error[32];
   char error_ode[32];
+  char error_own[32];
   char floor[32];
   char name[64];
   size_t asleep = world_sleeps(r->of.world) ? (size_t)r->of.bodies : 0;
   error_text(r->error, error, sizeof error);
   error_text(r->error_ode, error_ode, sizeof error_ode);
+  error_text(r->error_own, error_own, sizeof error_own);
   error_text(r->floor, floor, sizeof floor);
   snprintf(name, sizeof name, "%s:%d@%g, %s %g Hz", r->of.world, r->of.bodies, r->of.haptic_hz,
            contestant_name(r->who), row_physics_hz(r));
-  bench_say("%-36s %8.1f us a ms, p99 %8.1f us, force %s (floor %s), of ODE's %s", name,
-            r->us_per_ms, r->p99_us, error, floor, error_ode);
+  bench_say("%-36s %8.1f us a ms, p99 %8.1f us, force %s (floor %s), of ODE's %s, of its own %s",
+            name, r->us_per_ms, r->p99_us, error, floor, error_ode, error_own);
   if (b->verify) {
     bench_check(b, isnan(r->first) || fabs(r->first - 1.0) <= FIRST_WITHIN,
                 "%s: first force %.3f of ODE's (bound %g)", name, r->first, FIRST_WITHIN);
@@ -371,6 +384,7 @@ static hap_status case_run(peers_bed *bed, FILE *csv, const peers_case *of)
   bench *b = bed->bench;
   peer_world world;
   peers_truth ode_truth = {{0}};
+  peers_run session_truth = {0};
   peers_row *rows = &bed->rows[bed->row_count];
   size_t count = 0;
   if (!peer_world_create(of->world, of->bodies, &world)) {
@@ -394,12 +408,16 @@ static hap_status case_run(peers_bed *bed, FILE *csv, const peers_case *of)
   if (status >= HAP_OK && count > 0) {
     status = truth_find(b, &peer_ode, of, &ode_truth);
   }
+  if (status >= HAP_OK && count > 0 && rows[0].who->engine == NULL) { /* sessions come first */
+    status = truth_run(b, NULL, of, 0.0, &session_truth);
+  }
   for (size_t i = 0; i < count && status >= HAP_OK; ++i) {
-    status = row_judge(b, &world, &ode_truth, &rows[i]);
+    status = row_judge(b, &world, &ode_truth, &session_truth, &rows[i]);
     row_write(csv, &rows[i]);
     row_report(b, &rows[i]);
   }
   peers_run_free(&ode_truth.run);
+  peers_run_free(&session_truth);
   peer_world_destroy(&world);
   progress_add(1, case_cost(of));
   return status;

@@ -14,6 +14,8 @@
 #include "bench/peer_ode.h"
 
 #define MAX_FORCE 200.0 /* N: nothing limits the hand */
+#define FULL_ACCURACY 1.0
+#define FULL_CONTACT_HZ 1000.0
 
 static size_t settle_ticks(const peer_world *world, double tick_s)
 {
@@ -167,6 +169,10 @@ static hap_status session_open(bench *b, size_t ticks, session_bed *bed)
   def.physics_hz = bed->setting->physics_hz;
   def.haptic_hz = bed->setting->haptic_hz;
   expert.trace_rows = (int32_t)ticks;
+  if (bed->setting->to_the_end) {
+    def.accuracy = FULL_ACCURACY;
+    expert.contact_hz = FULL_CONTACT_HZ;
+  }
   if (bed->setting->range_hops > 0) {
     expert.range_hops = bed->setting->range_hops;
   }

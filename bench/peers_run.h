@@ -31,6 +31,7 @@ typedef struct peers_session_setting {
   double physics_hz;
   double haptic_hz;
   bool may_sleep;
+  bool to_the_end;  /* its own truth: accuracy 1, contact passes at 1 kHz */
   int range_hops;   /* of the range; 0: as by default */
   int range_bodies; /* of the range at most; 0: as by default */
 } peers_session_setting;

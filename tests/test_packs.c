@@ -441,7 +441,7 @@ static void same_bits(void)
   CHECK(one.solver.sweeps == two.solver.sweeps && one.solver.sweeps > 2);
   CHECK(memcmp(one.v, two.v, sizeof one.v) == 0);
   CHECK(memcmp(&one.solver.residual, &two.solver.residual, sizeof(double)) == 0);
-  CHECK(memcmp(&one.solver.corrected, &two.solver.corrected, sizeof(double)) == 0);
+  CHECK(memcmp(&one.solver.swept.energy2, &two.solver.swept.energy2, sizeof(double)) == 0);
   for (uint32_t i = 0; i < one.solver.row_count; ++i) {
     CHECK(memcmp(&one.rows[i].impulse, &two.rows[i].impulse, sizeof(double)) == 0);
   }

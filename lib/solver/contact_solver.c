@@ -186,12 +186,14 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, boo
 
 /* ---- sweeps ---- */
 
-static inline void correction_note(const hapi_row *row, double change, hapi_corrections *io)
+/* Returns its size, m/s. */
+static inline double correction_note(const hapi_row *row, double change, hapi_corrections *io)
 {
   double correction = change * row->response;
   double size = fabs(correction);
   io->largest = size > io->largest ? size : io->largest;
   io->energy2 += change * correction;
+  return size;
 }
 
 /* The rows of a body wait for each other, so that the way from v to v counts: the change is cut by
@@ -212,7 +214,10 @@ static void row_update(hapi_solver *solver, hapi_row *row, hapi_corrections *io)
   double change = hapi_clamp(wanted, lo - old, hi - old);
   hapi_row_push(solver, row, change);
   row->impulse = hapi_clamp(old + wanted, lo, hi); /* exactly at its bound */
-  correction_note(row, change, io);
+  double size = correction_note(row, change, io);
+  if (lo == -HUGE_VAL && hi == HUGE_VAL) {
+    io->opening = size > io->opening ? size : io->opening;
+  }
 }
 
 /* The change of a row's impulse, cut at its bounds. */
@@ -259,7 +264,7 @@ static void update_triple(hapi_solver *solver, hapi_row *r, hapi_corrections *io
     push_triple(solver->v[r->b], d, r[0].bb, r[1].bb, r[2].bb);
   }
   for (int i = 0; i < 3; ++i) {
-    correction_note(&r[i], d[i], io);
+    (void)correction_note(&r[i], d[i], io);
   }
 }
 
@@ -433,7 +438,7 @@ static void sweep_back(hapi_solver *solver, uint32_t begin, uint32_t end, hapi_c
 /* Forward, the loose rows first; they begin with those of the hand. */
 static void rows_sweep(hapi_solver *solver)
 {
-  hapi_corrections sum = {0.0, 0.0};
+  hapi_corrections sum = {0};
   uint32_t runs = hapi_loose_count(solver);
   bool forward = solver->sweeps++ % 2 == 0;
   for (uint32_t i = 0; forward && i < runs; ++i) {
@@ -448,7 +453,7 @@ static void rows_sweep(hapi_solver *solver)
     sweep_back(solver, at.first, at.end, &sum);
   }
   solver->residual = sum.largest;
-  solver->corrected = sum.energy2;
+  solver->swept = sum;
 }
 
 uint32_t hapi_solver_sweep_cost(const hapi_solver *solver)
@@ -539,7 +544,7 @@ static void number_go_on(double *now, double *x, double *p, double share)
 /* From the end of one sweep to the begin of the next one. */
 static void way_go_on(hapi_solver *solver, sweep_way *way)
 {
-  double size2 = solver->corrected; /* of each row's change since the begin */
+  double size2 = solver->swept.energy2; /* of each row's change since the begin */
   bool ahead = size2 <= way->size2 && way->size2 > 0.0 && way->size2 < HUGE_VAL;
   double share = ahead ? size2 / way->size2 : 0.0;
   size_t at = way->packed;
@@ -677,7 +682,8 @@ static void run_apart(hapi_solver *solver)
 static bool is_settled(const hapi_solver *solver)
 {
   return solver->residual < solver->tolerance ||
-         (solver->residual < HAPI_COARSE && solver->corrected < solver->coarse);
+         (solver->residual < HAPI_COARSE && solver->swept.opening <= solver->coarse.opening &&
+          solver->swept.energy2 < solver->coarse.energy2);
 }
 
 /* Of the corrections from sweep to sweep, by those of the last three: forward and backward ones go
@@ -698,7 +704,8 @@ static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t time
     share *= rate;
   }
   return share * solver->residual < HAPI_COARSE &&
-         share * share * solver->corrected < solver->coarse;
+         share * solver->swept.opening <= solver->coarse.opening &&
+         share * share * solver->swept.energy2 < solver->coarse.energy2;
 }
 
 /* All pairs of bodies are solved at once (aggregate.h) after two sweeps, then after each four more,
@@ -706,7 +713,7 @@ static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t time
 static bool pairs_are_due(const hapi_solver *solver, double corrected)
 {
   return solver->packs.in_use && solver->packs.aggregate != NULL && solver->sweeps >= 2 &&
-         (solver->sweeps - 2) % PAIRS_EACH == 0 && solver->corrected < PAIRS_FALL * corrected;
+         (solver->sweeps - 2) % PAIRS_EACH == 0 && solver->swept.energy2 < PAIRS_FALL * corrected;
 }
 
 /* Its cost in row updates, of `left`; 0: there is none. */
@@ -728,8 +735,8 @@ static uint32_t pairs_solve(hapi_solver *solver, uint64_t left)
  * better now. */
 static bool may_leave(const hapi_solver *solver, bool tried)
 {
-  return solver->enough > 0 && solver->coarse > 0.0 && solver->residual < HAPI_COARSE &&
-         (tried || solver->corrected < LEAVE * solver->coarse);
+  return solver->enough > 0 && solver->coarse.energy2 > 0.0 && solver->residual < HAPI_COARSE &&
+         (tried || solver->swept.energy2 < LEAVE * solver->coarse.energy2);
 }
 
 /* Whether one more direct solve is worth its cost. */
@@ -801,9 +808,9 @@ void hapi_solver_run(hapi_solver *solver)
     }
     rows_sweep(solver);
     updates_spend(solver, &left, cost);
-    double rate = sweeps_rate(before[1], before[0], solver->corrected);
+    double rate = sweeps_rate(before[1], before[0], solver->swept.energy2);
     before[1] = before[0];
-    before[0] = solver->corrected;
+    before[0] = solver->swept.energy2;
     bool enough = solver->updates >= solver->enough && may_leave(solver, tried);
     if (is_settled(solver) ||
         (solver->sweeps >= 2 && (enough || left < cost || solver->sweeps == solver->max_sweeps))) {

@@ -47,6 +47,12 @@ typedef struct hapi_direct_last {
   double residual; /* the largest correction due after it, m/s */
 } hapi_direct_last;
 
+/* A run is done also when a sweep's corrections are below all of these, and none is HAPI_COARSE. */
+typedef struct hapi_coarse {
+  double energy2; /* J, sum of impulse^2 x response; 0: never */
+  double opening; /* m/s, or as much, of a row without bounds, as those of joints are */
+} hapi_coarse;
+
 typedef struct hapi_solver {
   hapi_row *rows;
   double (*v)[6];    /* in: free velocities, without any row's impulse; out: with all */
@@ -56,9 +62,8 @@ typedef struct hapi_solver {
   /* The last bodies of all, always b in their rows: each may touch many others, as light pointers
    * do. An island about them is solved part by part. */
   uint32_t hub_count;
-  double tolerance; /* m/s: done when the largest correction of a sweep is below */
-  double coarse;    /* J: done also when the corrections of a sweep have less energy, twice the
-                           sum of impulse^2 x response, and none is HAPI_COARSE; 0: never */
+  double tolerance;       /* m/s: done when the largest correction of a sweep is below */
+  hapi_coarse coarse;     /* what may stay undone */
   uint32_t update_budget; /* row updates in all sweeps and direct solves, these counted by their
                              cost; two sweeps are made in any case */
   uint32_t enough;      /* row updates, counted likewise: where `coarse` is above 0 and what is due
@@ -79,7 +84,7 @@ typedef struct hapi_solver {
   uint64_t updates;        /* out: row updates, direct solves counted by their cost */
   uint32_t direct_solves;  /* out: that were accepted */
   double residual;         /* out, m/s: the largest correction still due; HUGE_VAL: v not finite */
-  double corrected;        /* inner: J, twice the energy of the last sweep's corrections */
+  hapi_corrections swept;  /* inner: of the last sweep */
 } hapi_solver;
 
 /* m/s: what is left undone and may add energy; below, asking costs too much */

@@ -97,6 +97,7 @@ typedef struct hapi_loose_rows {
 typedef struct hapi_corrections {
   double largest; /* m/s */
   double energy2; /* J, sum of impulse^2 x response */
+  double opening; /* m/s, largest of rows without bounds, as those of joints are */
 } hapi_corrections;
 
 /* By lane, J: see solver_calm.c. */

@@ -477,20 +477,23 @@ static void rows_note_unsolved(hapi_rows *rows)
 }
 
 /* What the solves of this tick may leave undone: by the springs to hands. It fades where their
- * forces become less, and stays while a hand that touched is in reach, as one that taps. */
+ * forces become less, and stays while a hand that touched is in reach, as one that taps. Joints
+ * among contacts are closed: errors of both say which contacts slide. */
 static void rows_set_coarse(hapi_rows *rows, bool reaches)
 {
   bool touches = rows->hand < HUGE_VAL;
   double high = hapi_max((double)rows->solver.packs.height / COARSE_LEVELS, 1.0);
   double drift = rows->drift / (high * high);
-  double before = rows->touched ? rows->solver.coarse : 0.0;
+  double before = rows->touched ? rows->solver.coarse.energy2 : 0.0;
   rows->touched = reaches && (rows->touched || touches);
   if (touches) {
     before = hapi_max(drift * drift * rows->hand, COARSE_FADE * before);
   }
   double most = (rows->touched ? COARSE_MOST : COARSE_REST) * (double)rows->solver.body_count;
   most = rows->drift > 0.0 ? most : 0.0;
-  rows->solver.coarse = rows->touched ? hapi_min(before, most) : most;
+  rows->solver.coarse.energy2 = rows->touched ? hapi_min(before, most) : most;
+  bool contacts = rows->solver.row_count > rows->contact_begin;
+  rows->solver.coarse.opening = contacts ? rows->solver.tolerance : HAPI_COARSE;
 }
 
 /* Row updates of this tick, as if all rows were kept. */
@@ -523,7 +526,7 @@ static inline void rows_solve(hapi_rows *rows, hapi_effect_sample *sample)
   uint32_t most = solver->update_budget;
   uint64_t left = work->most > work->done ? work->most - work->done : 0;
   solver->update_budget = work->most > 0 && left < most ? (uint32_t)left : most;
-  solver->enough = solver->coarse > 0.0 ? rows_enough(rows) : 0;
+  solver->enough = solver->coarse.energy2 > 0.0 ? rows_enough(rows) : 0;
   hapi_solver_run(solver);
   hapi_solver_calm(solver);
   solver->update_budget = most;
