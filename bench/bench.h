@@ -62,6 +62,7 @@ hap_status bench_poses(bench *b);
 hap_status bench_remote(bench *b);
 hap_status bench_scaling(bench *b);
 hap_status bench_spidar(bench *b);
+hap_status bench_spread(bench *b);
 hap_status bench_stability(bench *b);
 hap_status bench_stopped(bench *b);
 hap_status bench_tail(bench *b);

@@ -77,6 +77,9 @@ static const program programs[] = {
     {"scaling", bench_scaling, "world size: one neighbour among up to 1000 resting cubes"},
     {"spidar", bench_spidar,
      "string devices: poses from rounded counts, tensions, times; numerics alone, no device"},
+    {"spread", bench_spread,
+     "how sure a force is: worlds that begin 0.1 um aside, in sessions and in solved engines; "
+     "--scene WORLD:N"},
     {"stability", bench_stability,
      "where each integrator holds: stiffness, mass, contacts at once; --only KEY=VALUE/VALUE,...: "
      "of "
@@ -207,7 +210,7 @@ static bool options_fit(const program *p, const bench *b)
   if (b->scene != NULL && p->run != bench_accuracy && p->run != bench_tick &&
       p->run != bench_effects && p->run != bench_faults && p->run != bench_late &&
       p->run != bench_peers && p->run != bench_remote && p->run != bench_hosting &&
-      p->run != bench_influence && p->run != bench_tail) {
+      p->run != bench_influence && p->run != bench_spread && p->run != bench_tail) {
     wrong = "has no scenes to choose from";
   } else if (b->random_worlds > 0 && (p->run != bench_faults || b->scene != NULL)) {
     wrong = "has no random worlds: --random is for faults, without --scene";

@@ -306,6 +306,37 @@ TEST(a_session_in_a_pile_is_nearer_to_itself_than_to_another_engine)
   CHECK(own < 0.5 * number_of(row, "force_rel_ode"));
 }
 
+/* Where bodies say all, every engine agrees with itself, and a session with ODE. */
+TEST(the_force_of_a_row_is_sure)
+{
+  folder_clear();
+  REQUIRE(run("spread --quick --scene row:4 --out %s", test_folder) == 0);
+  const char *text = file_text(folder_path("spread.csv"));
+  const char *row = strchr(text, '\n');
+  REQUIRE(strncmp(text,
+                  "engine,world,bodies,physics_hz,solved,worlds,spread_least,spread_most,"
+                  "off_ode,off_own,peak_n\n",
+                  91) == 0);
+  CHECK(lines_with(text, "hapode,row,4,60,0,3,") == 1);
+  CHECK(lines_with(text, "hapode,row,4,20,0,3,") == 1);
+  CHECK(lines_with(text, "hapode,row,4,1000,1,3,") == 1);
+  CHECK(lines_with(text, "ode,row,4,1000,1,3,") == 2); /* and hapode */
+  for (; row != NULL && row[1] != '\0'; row = strchr(row + 1, '\n')) {
+    double least;
+    double most;
+    double off_own;
+    double off_ode;
+    REQUIRE(sscanf(row + 1, "%*[^,],row,4,%*g,%*d,3,%lf,%lf,%lf,%lf,", &least, &most, &off_ode,
+                   &off_own) == 4);
+    CHECK(least > 0.0 && least <= most && most < 1e-3);
+    CHECK(off_own < 0.02);
+    CHECK(row[1] != 'h' || off_ode < 0.02);
+  }
+  REQUIRE(run("spread --scene row --out %s", test_folder) == 1);
+  REQUIRE(run("spread --scene row:1000 --out %s", test_folder) == 1);
+  CHECK(run("spread --scene nothing:4 --out %s", test_folder) == 1);
+}
+
 /* The first force is that of 1 kHz: spring and damper of the hand do not know of ticks. */
 TEST(a_hand_of_4_khz_has_the_same_first_force)
 {
