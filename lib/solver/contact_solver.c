@@ -833,10 +833,7 @@ void hapi_solver_run(hapi_solver *solver)
       uint32_t spent = direct_run(solver, (uint32_t)left - cost);
       updates_spend(solver, &left, spent);
       solver->direct.cost = spent;
-      bool vain = solver->direct_solves == accepted;
-      tried = tried || vain;
-      /* Twice as many sweeps before the next one; but sweeps do not close joints. */
-      direct_from = vain && solver->swept.opening == 0.0 ? 2 * solver->sweeps : direct_from;
+      tried = tried || solver->direct_solves == accepted;
       way.begun = false;
       before[0] = before[1] = 0.0;
       bool first = dearest == 0;
