@@ -27,6 +27,7 @@
 #define ENTRIES_MOST 10
 #define SCENES_MOST 8
 #define BODIES_MOST 100 /* more take too long */
+#define OWN_MOST 0.06   /* what the settings of a session may cost */
 
 typedef struct spread_scene {
   char world[32];
@@ -171,6 +172,11 @@ static void entry_tell(const spread_bed *bed, const spread_entry *e, FILE *csv)
       bed->of.world, bed->of.bodies, entry_name(e), entry_hz(e), e->solved ? ", solved" : "",
       100.0 * e->least, 100.0 * e->most, 100.0 * off_ode, 100.0 * off_own,
       peers_run_peak(&e->mean));
+  if (bed->bench->verify && !e->solved) {
+    bench_check(bed->bench, off_own <= OWN_MOST,
+                "%s:%d, %s %g Hz: %.2f %% from itself solved to the end (bound %g)", bed->of.world,
+                bed->of.bodies, entry_name(e), entry_hz(e), 100.0 * off_own, 100.0 * OWN_MOST);
+  }
 }
 
 static void forces_draw(FILE *script, const void *data)

@@ -310,7 +310,8 @@ TEST(a_session_in_a_pile_is_nearer_to_itself_than_to_another_engine)
 TEST(the_force_of_a_row_is_sure)
 {
   folder_clear();
-  REQUIRE(run("spread --quick --scene row:4 --out %s", test_folder) == 0);
+  REQUIRE(run("spread --quick --verify --scene row:4 --out %s", test_folder) == 0);
+  CHECK(said_lines("ok ") == 2 && said_lines("spread: 0 off") == 1);
   const char *text = file_text(folder_path("spread.csv"));
   const char *row = strchr(text, '\n');
   REQUIRE(strncmp(text,

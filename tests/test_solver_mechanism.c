@@ -217,6 +217,20 @@ static double energy_of(double v[BODIES][6])
   return sum;
 }
 
+static hapi_solver solver_of(uint32_t budget)
+{
+  return (hapi_solver){.rows = m.rows,
+                       .v = m.v,
+                       .free = m.free_v,
+                       .row_count = m.row_count,
+                       .body_count = m.body_count,
+                       .tolerance = 1e-7,
+                       .update_budget = budget,
+                       .direct_rows = 1000,
+                       .work = m.work,
+                       .work_count = sizeof m.work / sizeof m.work[0]};
+}
+
 /* Velocities that have nothing to do with the joints, from no impulses: harder than any tick. */
 static void problems_solve(double light, double mu, double size, int unsolved_most)
 {
@@ -228,16 +242,7 @@ static void problems_solve(double light, double mu, double size, int unsolved_mo
   for (int i = 0; i < PROBLEMS; ++i) {
     biped_make(light, mu);
     velocities_draw(&seed, size);
-    hapi_solver solver = {.rows = m.rows,
-                          .v = m.v,
-                          .free = m.free_v,
-                          .row_count = m.row_count,
-                          .body_count = m.body_count,
-                          .tolerance = 1e-7,
-                          .update_budget = budget,
-                          .direct_rows = 1000,
-                          .work = m.work,
-                          .work_count = sizeof m.work / sizeof m.work[0]};
+    hapi_solver solver = solver_of(budget);
     hapi_solver_run(&solver);
     const double due = due_most(true);
     unsolved += !(due < HAPI_UNSOLVED);
@@ -272,16 +277,7 @@ TEST(a_small_budget_holds)
   for (uint32_t budget = 0; budget < 20000; budget += 1371) {
     biped_make(0.2, 0.7);
     velocities_draw(&seed, 0.5);
-    hapi_solver solver = {.rows = m.rows,
-                          .v = m.v,
-                          .free = m.free_v,
-                          .row_count = m.row_count,
-                          .body_count = m.body_count,
-                          .tolerance = 1e-7,
-                          .update_budget = budget,
-                          .direct_rows = 1000,
-                          .work = m.work,
-                          .work_count = sizeof m.work / sizeof m.work[0]};
+    hapi_solver solver = solver_of(budget);
     hapi_solver_run(&solver);
     CHECK(solver.updates <= budget + 2 * (uint64_t)m.row_count);
     if (solver.residual >= HAPI_UNSOLVED) {
@@ -301,17 +297,8 @@ static double opening_left(double opening, double *out_updates)
   for (int i = 0; i < PROBLEMS; ++i) {
     biped_make(0.2, 0.0);
     velocities_draw(&seed, 0.05);
-    hapi_solver solver = {.rows = m.rows,
-                          .v = m.v,
-                          .free = m.free_v,
-                          .row_count = m.row_count,
-                          .body_count = m.body_count,
-                          .tolerance = 1e-7,
-                          .coarse = {.energy2 = 1e-8, .opening = opening},
-                          .update_budget = 200000,
-                          .direct_rows = 1000,
-                          .work = m.work,
-                          .work_count = sizeof m.work / sizeof m.work[0]};
+    hapi_solver solver = solver_of(200000);
+    solver.coarse = (hapi_coarse){.energy2 = 1e-8, .opening = opening};
     hapi_solver_run(&solver);
     CHECK(solver.residual < HAPI_COARSE);
     worst = fmax(worst, due_most(false));

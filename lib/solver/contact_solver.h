@@ -47,10 +47,10 @@ typedef struct hapi_direct_last {
   double residual; /* the largest correction due after it, m/s */
 } hapi_direct_last;
 
-/* A run is done also when a sweep's corrections are below all of these, and none is HAPI_COARSE. */
+/* A run is done also when the corrections of a sweep are small enough: none is HAPI_COARSE, and */
 typedef struct hapi_coarse {
-  double energy2; /* J, sum of impulse^2 x response; 0: never */
-  double opening; /* m/s, or as much, of a row without bounds, as those of joints are */
+  double energy2; /* J: their sum of impulse^2 x response is below; 0: never done so */
+  double opening; /* m/s: none of a row without bounds, as of a joint, is above */
 } hapi_coarse;
 
 typedef struct hapi_solver {
