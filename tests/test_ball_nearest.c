@@ -7,6 +7,7 @@
 #include "base/pose.h"
 #include "base/vec.h"
 #include "local/ball_nearest.h"
+#include "proximity/support.h"
 
 /* The tick's own way to the nearest point of a ball, against that of all shapes. */
 
@@ -94,4 +95,34 @@ TEST(what_has_no_closed_form_and_what_is_no_number)
   CHECK(hapi_ball_nearest(center, 0.1, &shape, &pose, &world, &nearest));
   center[0] = (double)NAN;
   CHECK(!hapi_ball_nearest(center, 0.1, &shape, &pose, &world, &nearest));
+}
+
+/* From far away along many directions: how much of the way the shape takes up. */
+TEST(a_shape_is_within_its_reach_and_comes_near_it)
+{
+  static const hapi_shape_kind kinds[] = {HAPI_SHAPE_SPHERE, HAPI_SHAPE_BOX, HAPI_SHAPE_CAPSULE,
+                                          HAPI_SHAPE_CYLINDER};
+  const hapi_touch_frame world = {NULL, NULL};
+  const double far = 1e4;
+  uint64_t state = 1;
+  for (int i = 0; i < 40; ++i) {
+    hapi_shape shape = random_shape(&state, kinds[i % 4]);
+    double reach = hapi_shape_reach(&shape);
+    double most = 0.0;
+    hap_pose pose;
+    random_pose(&state, &pose);
+    for (int k = 0; k < 2000; ++k) {
+      double way[3] = {random_in(&state, -1.0, 1.0), random_in(&state, -1.0, 1.0),
+                       random_in(&state, -1.0, 1.0)};
+      double from[3];
+      hapi_nearest nearest;
+      hapi_v3_madd(pose.position, far / hapi_v3_norm(way), way, from);
+      REQUIRE(hapi_ball_nearest(from, 0.0, &shape, &pose, &world, &nearest));
+      most = fmax(most, far - nearest.distance);
+    }
+    CHECK(most < reach + 1e-3); /* the corner is seen from a finite distance */
+    CHECK(most > 0.98 * reach);
+  }
+  CHECK(isinf(hapi_shape_reach(&(hapi_shape){.kind = HAPI_SHAPE_PLANE})));
+  CHECK(isinf(hapi_shape_reach(&(hapi_shape){.kind = HAPI_SHAPE_HULL})));
 }

@@ -65,10 +65,33 @@ TEST(two_flush_boxes_push_once)
   }
 }
 
-/* A body of boxes at these places, which does not move. */
-static void add_body(contact_world *w, const double (*at)[2], int count)
+/* Where the corners of four meet, and at the rims of two: as far from their middles as it goes. */
+TEST(corners_and_rims_are_hidden_as_well)
 {
-  dBodyID body = cw_add_cube(w, 1.0, 0.1, 0.0, 0.0, -0.05);
+  contact_world w;
+  open_world(&w, 0.0);
+  for (int i = 0; i < 4; ++i) {
+    dGeomID block = add_block(&w, i < 2 ? -0.05 : 0.05, -0.05);
+    dGeomSetPosition(block, i < 2 ? -0.05 : 0.05, i % 2 == 0 ? -0.049 : 0.051, -0.05);
+  }
+  CHECK(slide_error(&w, 0.0) < 1e-6);
+  cw_close(&w);
+  open_world(&w, 0.0);
+  for (int i = 0; i < 2; ++i) {
+    dGeomID rod = dCreateCylinder(w.space, 0.05, 0.1);
+    dMatrix3 along_x;
+    dRFromAxisAndAngle(along_x, 0.0, 1.0, 0.0, M_PI / 2.0);
+    dGeomSetRotation(rod, along_x);
+    dGeomSetPosition(rod, i == 0 ? -0.05 : 0.05, 0.001, -0.05);
+  }
+  CHECK(slide_error(&w, 0.0) < 1e-6);
+  cw_close(&w);
+}
+
+/* A body at x of boxes at these places in it, which does not move. */
+static void add_body(contact_world *w, double x, const double (*at)[2], int count)
+{
+  dBodyID body = cw_add_cube(w, 1.0, 0.1, x, 0.0, -0.05);
   dBodySetKinematic(body);
   for (int i = 0; i < count; ++i) {
     dGeomID box = i == 0 ? dBodyGetFirstGeom(body) : dCreateBox(w->space, 0.1, 0.1, 0.1);
@@ -80,11 +103,14 @@ static void add_body(contact_world *w, const double (*at)[2], int count)
 TEST(one_body_of_two_boxes_pushes_once)
 {
   static const double at[2][2] = {{-0.05, 0.0}, {0.05, 0.0}};
-  contact_world w;
-  open_world(&w, 0.3);
-  add_body(&w, at, 2);
-  CHECK(slide_error(&w, 0.3) < 1e-6);
-  cw_close(&w);
+  static const double aside[2][2] = {{-0.45, 0.0}, {-0.35, 0.0}};
+  for (int i = 0; i < 2; ++i) {
+    contact_world w;
+    open_world(&w, 0.3);
+    add_body(&w, i == 0 ? 0.0 : 0.4, i == 0 ? at : aside, 2);
+    CHECK(slide_error(&w, 0.3) < 1e-6);
+    cw_close(&w);
+  }
 }
 
 /* They reach into each other, one of them a little lower. */
@@ -93,7 +119,7 @@ TEST(one_body_of_boxes_that_overlap_pushes_once)
   static const double at[3][2] = {{-0.05, 0.0}, {0.04, 0.0}, {-0.01, -0.003}};
   contact_world w;
   open_world(&w, 0.5);
-  add_body(&w, at, 3);
+  add_body(&w, 0.0, at, 3);
   CHECK(slide_error(&w, 0.5) < 1e-6);
   cw_close(&w);
 }

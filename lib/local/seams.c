@@ -7,6 +7,7 @@
 #include "base/pose.h"
 #include "local/ball_nearest.h"
 #include "local/pointer_friction.h"
+#include "proximity/support.h"
 
 /* A step between two surfaces that is none: of the pointer's radius, and m at most. */
 #define ON_SHARE 0.01
@@ -43,12 +44,18 @@ static bool shape_distance(const hapi_touches *touches, const hapi_local_contact
   return true;
 }
 
+/* m, a step between two surfaces that is none. */
+static double no_step(double radius)
+{
+  return fmin(ON_SHARE * radius, ON_MOST);
+}
+
 static bool contact_hides(const hapi_touches *touches, const hapi_local_contact *by,
                           const hapi_local_contact *c, const hapi_pointer *p,
                           const hapi_bodies *bodies)
 {
   double radius = p->shape.radius;
-  double step = fmin(ON_SHARE * radius, ON_MOST);
+  double step = no_step(radius);
   double held[3];
   double distance;
   if (!shape_distance(touches, by, hapi_bodies_at(bodies, by->body), c->point_now, 0.0,
@@ -92,12 +99,6 @@ static void friction_hand_over(const hapi_tick_facts *facts, const hapi_pointer 
   hapi_friction_resume(taker, facts->tick, to, &place, stretch, held->left * held->now.turn);
 }
 
-/* The deeper one; of two that are as deep, the first. */
-static bool goes_before(const hapi_local_contact *a, const hapi_local_contact *b)
-{
-  return a->ramp.depth > b->ramp.depth || (a->ramp.depth == b->ramp.depth && a < b);
-}
-
 /* Of a sphere, near its pointer. */
 static bool is_near(const hapi_local_contact *c, const hapi_pointers *pointers)
 {
@@ -105,38 +106,61 @@ static bool is_near(const hapi_local_contact *c, const hapi_pointers *pointers)
          c->ramp.depth > -REACH * pointers->of[c->pointer].shape.radius;
 }
 
-/* Those that may hide others, by their next_hider; returns the first one. What is deeper than a
- * contact that is near is near as well. */
-static uint32_t hiders_list(const hapi_pointers *pointers, const hapi_touches *touches)
+/* Those that may hide others; returns how many. What is deeper than a contact that is near is near
+ * as well. */
+static uint32_t hiders_list(const hapi_pointers *pointers, const hapi_bodies *bodies,
+                            const hapi_touches *touches)
 {
-  uint32_t first = HAPI_SLOT_NONE;
-  for (uint32_t i = touches->count; i > 0; --i) {
-    hapi_local_contact *c = &touches->of[i - 1];
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < touches->count; ++i) {
+    const hapi_local_contact *c = &touches->of[i];
     if (hapi_touch_has_shape(c) && is_near(c, pointers)) {
-      c->next_hider = first;
-      first = i - 1;
+      double step = no_step(pointers->of[c->pointer].shape.radius);
+      bool known = c->asked.told.count == 0;
+      hapi_hider *hider = &touches->hiders[count++];
+      hapi_body_point(hapi_bodies_at(bodies, c->body), c->asked.pose.position, hider->middle);
+      hider->within = known ? hapi_shape_reach(&c->asked.shape) + 2.0 * step : HUGE_VAL;
+      hider->depth = c->ramp.depth;
+      hider->contact = i;
+      hider->pointer = c->pointer;
     }
   }
-  return first;
+  return count;
+}
+
+/* The deeper one; of two that are as deep, the first. */
+static bool goes_before(const hapi_hider *hider, const hapi_local_contact *c, uint32_t index)
+{
+  return hider->depth > c->ramp.depth || (hider->depth == c->ramp.depth && hider->contact < index);
+}
+
+/* Surely: of many things side by side most are, and need not be asked for the nearest of their
+ * points. */
+static bool is_far(const hapi_hider *hider, const double point[3])
+{
+  double way[3];
+  hapi_v3_sub(point, hider->middle, way);
+  return hapi_v3_dot(way, way) > hider->within * hider->within;
 }
 
 void hapi_seams_hide(const hapi_tick_facts *facts, const hapi_pointers *pointers,
                      const hapi_bodies *bodies, const hapi_touches *touches)
 {
-  uint32_t first = hiders_list(pointers, touches);
+  uint32_t count = hiders_list(pointers, bodies, touches);
   for (uint32_t i = 0; i < touches->count; ++i) {
     hapi_local_contact *c = &touches->of[i];
     const hapi_pointer *p = &pointers->of[c->pointer];
     c->hidden = c->is_hidden;
-    if (first == HAPI_SLOT_NONE || !is_near(c, pointers)) {
+    if (count == 0 || !is_near(c, pointers)) {
       continue;
     }
-    for (uint32_t k = first; k != HAPI_SLOT_NONE && !c->hidden; k = touches->of[k].next_hider) {
-      const hapi_local_contact *by = &touches->of[k];
-      if (k != i && by->pointer == c->pointer && goes_before(by, c) &&
-          contact_hides(touches, by, c, p, bodies)) {
+    for (uint32_t k = 0; k < count && !c->hidden; ++k) {
+      const hapi_hider *hider = &touches->hiders[k];
+      if (!is_far(hider, c->point_now) && hider->pointer == c->pointer &&
+          goes_before(hider, c, i) &&
+          contact_hides(touches, &touches->of[hider->contact], c, p, bodies)) {
         c->hidden = true;
-        friction_hand_over(facts, p, bodies, touches, c, by);
+        friction_hand_over(facts, p, bodies, touches, c, &touches->of[hider->contact]);
       }
     }
   }

@@ -90,14 +90,13 @@ typedef struct hapi_local_contact {
   uint32_t pointer;
   uint32_t pointer_generation;
   uint32_t generation;
-  uint32_t epoch;      /* of the body, when the model came */
-  uint32_t tool;       /* of a hull: 1 + index into the tools; 0: of a sphere */
-  uint32_t row;        /* model CONTACT: in this tick, HAPI_NO_ROW */
-  uint32_t next_hider; /* scratch of seams.c */
-  bool seen;           /* rendered at least once */
-  bool placed;         /* in this tick, where pointers touch several things */
-  bool hidden;         /* in this tick: the surface goes on behind it, see seams.h */
-  bool is_hidden;      /* by what the model says; for shapes that the loop does not ask */
+  uint32_t epoch; /* of the body, when the model came */
+  uint32_t tool;  /* of a hull: 1 + index into the tools; 0: of a sphere */
+  uint32_t row;   /* model CONTACT: in this tick, HAPI_NO_ROW */
+  bool seen;      /* rendered at least once */
+  bool placed;    /* in this tick, where pointers touch several things */
+  bool hidden;    /* in this tick: the surface goes on behind it, see seams.h */
+  bool is_hidden; /* by what the model says; for shapes that the loop does not ask */
 
   double point_body[3];
   double normal_body[3];
@@ -210,6 +209,15 @@ typedef struct hapi_kept_touch {
   hapi_touch_lift lift;
 } hapi_kept_touch;
 
+/* A contact that may hide others: see seams.h. */
+typedef struct hapi_hider {
+  double middle[3]; /* m, world: of its shape */
+  double within;    /* m: what is farther from there is not hidden; HUGE_VAL: not known */
+  double depth;     /* m */
+  uint32_t contact; /* index */
+  uint32_t pointer;
+} hapi_hider;
+
 typedef struct hapi_touches {
   hapi_local_contact *of; /* of spheres, then of hulls; count in all */
   uint32_t count;
@@ -218,6 +226,7 @@ typedef struct hapi_touches {
   bool rubs;                /* some contact rubs */
   hapi_kept_touch *kept;    /* capacity.contacts */
   hapi_friction *frictions; /* by contact slot; of spheres */
+  hapi_hider *hiders;       /* scratch of seams.c; capacity.contacts */
   hapi_tool_world tool;
   hapi_crosses crosses;
   hapi_pair_feel *feels;     /* capacity.feels */

@@ -56,12 +56,28 @@ void hapi_solid_size(hapi_solid *solid, const hapi_shape *shape)
   }
 }
 
+/* m, of a core with sizes. */
+static double core_reach(const hapi_solid *solid)
+{
+  return sqrt(hapi_v3_dot(solid->half, solid->half) + solid->disc * solid->disc);
+}
+
+double hapi_shape_reach(const hapi_shape *shape)
+{
+  hapi_solid solid;
+  if (shape->kind == HAPI_SHAPE_PLANE || shape->kind == HAPI_SHAPE_HULL) {
+    return HUGE_VAL;
+  }
+  hapi_solid_size(&solid, shape);
+  return core_reach(&solid) + solid.ball;
+}
+
 static bool sizes_set(hapi_solid *solid, const hapi_shape *shape)
 {
   hapi_solid_size(solid, shape);
   const double *h = solid->half;
   double round[2] = {solid->disc, solid->ball};
-  solid->reach = sqrt(hapi_v3_dot(h, h) + solid->disc * solid->disc);
+  solid->reach = core_reach(solid);
   return hapi_finite(h, 3) && hapi_finite(round, 2) && h[0] >= 0.0 && h[1] >= 0.0 && h[2] >= 0.0 &&
          round[0] >= 0.0 && round[1] >= 0.0;
 }

@@ -32,6 +32,10 @@ bool hapi_solid_place(hapi_solid *solid, const hapi_shape *shape, const hap_pose
  * checked. */
 void hapi_solid_size(hapi_solid *solid, const hapi_shape *shape);
 
+/* m: all of the shape is within this distance of its pose's position. Infinite: planes, and hulls,
+ * whose corners are not looked at. */
+double hapi_shape_reach(const hapi_shape *shape);
+
 /* Both of a pair, from the position of a. False as above, and for two planes. */
 bool hapi_pair_place(const hapi_shape *a, const hap_pose *pose_a, const hapi_shape *b,
                      const hap_pose *pose_b, hapi_solid out[2]);

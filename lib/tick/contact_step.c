@@ -74,7 +74,6 @@ static void body_begin_awake(hapi_bodies *bodies, hapi_local_body *body, bool st
     body->stay.still.quiet = 0;
   }
   hapi_body_free_velocity(body, period, solver->v[body->row]);
-  memcpy(solver->free[body->row], solver->v[body->row], sizeof solver->free[0]);
   bodies->resting += (body->flags & HAPI_BODY_RESTING) != 0;
 }
 
@@ -87,7 +86,6 @@ static bool body_begin_still(hapi_local_body *body, double period, hapi_solver *
   }
   body->flags |= still->touched ? (uint32_t)HAPI_BODY_TOUCHED : 0u;
   memcpy(solver->v[body->row], still->free, sizeof solver->v[0]);
-  memcpy(solver->free[body->row], still->free, sizeof solver->free[0]);
   return true;
 }
 
@@ -96,7 +94,6 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
 {
   hapi_solver *solver = &rows->solver;
   memset(solver->v[HAPI_STATIC_ROW], 0, sizeof solver->v[0]);
-  memset(solver->free[HAPI_STATIC_ROW], 0, sizeof solver->free[0]);
   solver->body_count = 1;
   hapi_solver_clear(solver);
   rows->kept = 0;
@@ -124,6 +121,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
              sizeof body->inverse_inertia);
     }
   }
+  memcpy(solver->free, solver->v, solver->body_count * sizeof solver->free[0]);
 }
 
 /* Whether the turning of the inertia is felt: that of a body round about all axes is not, and what

@@ -44,6 +44,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(touches.of, c->contacts + tools),
       ARRAY(touches.kept, c->contacts),
       ARRAY(touches.frictions, c->contacts),
+      ARRAY(touches.hiders, c->contacts),
       ARRAY(touches.tool.tools, tools),
       ARRAY(touches.tool.old_tools, tools),
       ARRAY(touches.tool.old_contacts, tools),
