@@ -9,6 +9,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/vec.h"
+#include "haptic/haptic_internal.h"
+#include "session/session_internal.h"
 #include "tests/contact_world.h"
 
 #define EDGE 0.05
@@ -343,4 +346,97 @@ TEST(with_a_border_a_hand_feels_what_ode_alone_gives)
     CHECK(here.force <= 1.1 * there.force);
     CHECK(here.force2 >= 0.8 * there.force2 && here.force2 <= 1.1 * there.force2);
   }
+}
+
+/* Only the lower one is in the loop, which carries the contact. What stands on it was let fall in
+ * each other step, with 0.15 m/s. */
+TEST(what_stands_on_a_body_of_the_loop_is_held_all_the_time)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  double fastest = 0.0;
+  w->def.physics_hz = 60.0;
+  w->expert.range_hops = 0;
+  cw_add_floor(w);
+  border_add(w, 0.0, 0.0, 0.5 * EDGE - 1e-5);
+  border_add(w, 0.0, 0.0, 1.5 * EDGE - 2e-5);
+  w->hand_def.radius = 0.01;
+  cw_start(w, -0.5 * EDGE - 0.012, 0.0, 0.5 * EDGE);
+  cw_run(w, 300);
+  for (int i = 0; i < 500; ++i) {
+    cw_run(w, 1);
+    fastest = fmax(fastest, cw_norm(dBodyGetLinearVel(w->bodies[1])));
+  }
+  hap_stats stats = cw_stats(w);
+  CHECK(stats.model.range_bodies == 1 && stats.model.edge_bodies == 1);
+  CHECK_SAY(fastest < 0.02, "%g m/s", fastest);
+}
+
+/* Square layers, each a cube narrower than the one below. */
+static void pyramid_add(contact_world *w, int side)
+{
+  const double pitch = EDGE - 1e-5;
+  cw_add_floor(w);
+  for (int layer = 0; layer < 4; ++layer) {
+    int width = side - layer;
+    for (int i = 0; i < width * width; ++i) {
+      int along = i / width;
+      border_add(w, 0.5 * EDGE + pitch * (along + 0.5 * layer),
+                 pitch * (i % width - 0.5 * (width - 1) + 0.2 * (along % 2)),
+                 0.5 * EDGE - 1e-5 + pitch * layer);
+    }
+  }
+}
+
+static double farthest_way(const contact_world *w, const double (*from)[3])
+{
+  double most = 0.0;
+  for (int i = 0; i < w->body_count; ++i) {
+    double way[3];
+    hapi_v3_sub(dBodyGetPosition(w->bodies[i]), from[i], way);
+    most = fmax(most, hapi_v3_norm(way));
+  }
+  return most;
+}
+
+/* Of the loop's bodies from ODE's; an interval's motion is part of it. */
+static double farthest_apart(const contact_world *w)
+{
+  const hapi_bodies *bodies = &w->session->haptic->tick.bodies;
+  double most = 0.0;
+  for (uint32_t i = 0; i < bodies->live_count; ++i) {
+    const hapi_local_body *body = &bodies->of[bodies->live[i]];
+    double way[3];
+    hapi_v3_sub(dBodyGetPosition((dBodyID)body->given.tag), body->pose.position, way);
+    most = fmax(most, hapi_v3_norm(way));
+  }
+  return most;
+}
+
+/* At rest, all in the loop, of which half then leave it. They sank and tilted for as long as they
+ * stood at the border: 2.3 mm in a second. */
+TEST(a_pile_at_rest_stays_a_pile_when_the_range_shrinks)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  double from[16][3] = {{0.0}};
+  w->def.physics_hz = 60.0;
+  dWorldSetQuickStepNumIterations(w->world, 50);
+  pyramid_add(w, 3);
+  REQUIRE(w->body_count == 14);
+  w->hand_def.radius = 0.01;
+  cw_start(w, -0.012, 0.0, 0.5 * EDGE);
+  cw_run(w, 500);
+  CHECK(cw_stats(w).model.range_bodies == 14);
+  for (int i = 0; i < w->body_count; ++i) {
+    hapi_v3_copy(dBodyGetPosition(w->bodies[i]), from[i]);
+  }
+  CHECK(hap_session_set_accuracy(w->session, 0.0) == HAP_OK);
+  cw_run(w, 1000);
+  hap_stats stats = cw_stats(w);
+  CHECK(stats.model.range_bodies < 10 && stats.model.edge_bodies > 4);
+  double most = farthest_way(w, (const double(*)[3])from);
+  double apart = farthest_apart(w);
+  printf("# %u in the loop, %u at its border: %.2f mm, apart %.3f mm\n", stats.model.range_bodies,
+         stats.model.edge_bodies, 1e3 * most, 1e3 * apart);
+  CHECK_SAY(most < 1.6e-3, "%g mm", 1e3 * most);
+  CHECK_SAY(apart < 0.2e-3, "%g mm", 1e3 * apart);
 }

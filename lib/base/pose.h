@@ -29,6 +29,17 @@ static inline void hapi_pose_move(hap_pose *pose, const hap_twist *twist, double
   hapi_quat_move(pose->quat_wxyz, twist->angular, seconds);
 }
 
+/* m, rad about world axes: from one pose to another, between which there is a small turn. */
+static inline void hapi_pose_way(const hap_pose *from, const hap_pose *to, double out[6])
+{
+  const double back[4] = {from->quat_wxyz[0], -from->quat_wxyz[1], -from->quat_wxyz[2],
+                          -from->quat_wxyz[3]};
+  double turn[4];
+  hapi_v3_sub(to->position, from->position, out);
+  hapi_quat_multiply(to->quat_wxyz, back, turn);
+  hapi_v3_scale(turn[0] < 0.0 ? -2.0 : 2.0, turn + 1, out + 3); /* q and -q are the same */
+}
+
 /* Between two poses, share 0..1; the shorter of the two turns, as q and -q are the same. */
 static inline void hapi_pose_blend(const hap_pose *from, const hap_pose *to, double share,
                                    hap_pose *out)

@@ -50,16 +50,6 @@ static double fade_left(const hapi_body_course *course, double seconds)
   return u >= 1.0 ? 0.0 : 1.0 - u * u * (3.0 - 2.0 * u);
 }
 
-/* From the second pose to the first. */
-static void poses_apart(const hap_pose *a, const hap_pose *b, double out[6])
-{
-  const double back[4] = {b->quat_wxyz[0], -b->quat_wxyz[1], -b->quat_wxyz[2], -b->quat_wxyz[3]};
-  double turn[4];
-  hapi_v3_sub(a->position, b->position, out);
-  hapi_quat_multiply(a->quat_wxyz, back, turn);
-  hapi_v3_scale(turn[0] < 0.0 ? -2.0 : 2.0, turn + 1, out + 3); /* small: else it leaps */
-}
-
 void hapi_course_adopt(hapi_body_course *course, hapi_model *model, const hapi_model_body *in,
                        const hap_pose *before, int64_t now_ns, hapi_local_body *body)
 {
@@ -77,7 +67,7 @@ void hapi_course_adopt(hapi_body_course *course, hapi_model *model, const hapi_m
     return;
   }
   double apart[6];
-  poses_apart(before, &body->pose, apart);
+  hapi_pose_way(&body->pose, before, apart); /* of what turned far it leaps */
   double way = hapi_v3_norm(apart);
   double turn = hapi_v3_norm(apart + 3);
   if ((way > APART_LEAST || turn > APART_LEAST) && way <= APART_MOST && turn <= TURN_MOST) {

@@ -8,17 +8,6 @@
 #include "base/pose.h"
 #include "local/body_stay.h"
 
-/* The rotation that takes one orientation to the other, as a vector: of small angles, and of large
- * ones the way. */
-static void turn_between(const double from[4], const double to[4], double out[3])
-{
-  double cosine = from[0] * to[0] + hapi_v3_dot(from + 1, to + 1);
-  hapi_v3_cross(from + 1, to + 1, out);
-  hapi_v3_madd(out, from[0], to + 1, out);
-  hapi_v3_madd(out, -to[0], from + 1, out);
-  hapi_v3_scale(cosine < 0.0 ? -2.0 : 2.0, out, out); /* q and -q are the same */
-}
-
 void hapi_body_draw_adopt(hapi_local_body *body, const hapi_model_body *in, double age_s,
                           bool goes_on)
 {
@@ -39,8 +28,7 @@ void hapi_body_draw_adopt(hapi_local_body *body, const hapi_model_body *in, doub
       draw->twist.angular[k] += age_s * in->b[3 + k];
     }
     hapi_pose_move(&there, &mean, age_s);
-    hapi_v3_sub(there.position, body->pose.position, draw->left);
-    turn_between(body->pose.quat_wxyz, there.quat_wxyz, draw->left + 3);
+    hapi_pose_way(&body->pose, &there, draw->left);
   } else {
     hapi_v3_copy(body->account.gain, draw->gain);
   }

@@ -8,14 +8,20 @@
 #include "base/pose.h"
 #include "base/vec.h"
 
-/* The loop gave a wrench P to a body outside of the range, and ODE has stepped the body with it.
- * Free, the body would have got H M^-1 P of velocity; along P it got less. The share that is
- * missing was taken up by what the loop does not have: a floor, a neighbour, a joint.
+/* The loop gave a wrench P to a body outside of the range, and ODE has stepped the body with it and
+ * with its weight, an acceleration f. Free, the body would have got H f + H M^-1 P of velocity;
+ * along P it got less. The share that is missing was taken up by what the loop does not have: a
+ * floor, a neighbour, a joint.
  *
- *   share = 1 - P.dv / (H P.M^-1 P),   cut to 0 .. 1
+ *   share = 1 - P.(dv - H f) / (H P.M^-1 P),   cut to 0 .. 1
  *
- * In the next interval the loop may hold the body with that much of P, and no more. The step says
- * all of it, so nothing has to be tested. */
+ * In the next interval the loop may hold the body with that much of P, and no more. What else the
+ * world did holds the weight, or does not: a body that stands on one of the loop's is held by P
+ * alone, and is as heavy in the loop. Its acceleration there is
+ *
+ *   f (1 + w.f / f.f),   w = dv / H - f - (1 - share) P / m,   between 0 and f
+ *
+ * The step says all of it, so nothing has to be tested. */
 
 static dBodyID braced_body(const hapi_account *account, const hapi_body_slot *slot)
 {
@@ -53,19 +59,57 @@ static void body_answer(dBodyID body, const double wrench[6], double out[6])
   hapi_m3_apply(inertia, wrench + 3, out + 3);
 }
 
+/* m/s, rad/s: by all but the weight, of a body with these velocities before the step; false: they
+ * are no numbers. */
+static bool velocity_gained(const hapi_account *account, dBodyID body, const hapi_slot_account *of,
+                            double out[6])
+{
+  body_velocity(body, out);
+  for (int k = 0; k < 6; ++k) {
+    out[k] -= of->before[k];
+  }
+  hapi_v3_madd(out, -account->cycle->step_s, of->falls, out);
+  return hapi_finite(out, 6);
+}
+
 static double taken_share(const hapi_account *account, dBodyID body, const double push[6],
-                          const double before[6])
+                          const double gained[6])
 {
   double answer[6];
-  double after[6];
   body_answer(body, push, answer);
-  body_velocity(body, after);
   double free = account->cycle->step_s * wrench_dot(push, answer);
-  if (!(free > 0.0) || !hapi_finite(after, 6)) {
-    return 0.0;
+  return free > 0.0 ? fmin(fmax(1.0 - wrench_dot(push, gained) / free, 0.0), 1.0) : 0.0;
+}
+
+/* 0..1, of the weight, that the world holds. */
+static double held_share(const hapi_account *account, dBodyID body, const double others_push[3],
+                         const double gained[3], const double falls[3])
+{
+  dMass mass;
+  double world[3];
+  double falls2 = hapi_v3_dot(falls, falls);
+  dBodyGetMass(body, &mass);
+  hapi_v3_scale(1.0 / account->cycle->step_s, gained, world);
+  hapi_v3_madd(world, -1.0 / mass.mass, others_push, world);
+  return falls2 > 0.0 ? fmin(fmax(-hapi_v3_dot(world, falls) / falls2, 0.0), 1.0) : 1.0;
+}
+
+/* What the loop is told of a body outside. */
+static void brace_find(const hapi_account *account, dBodyID body, const double push[6],
+                       hapi_slot_account *io)
+{
+  double gained[6];
+  double not_taken[3];
+  if (!velocity_gained(account, body, io, gained)) {
+    return;
   }
-  double got = wrench_dot(push, after) - wrench_dot(push, before);
-  return fmin(fmax(1.0 - got / free, 0.0), 1.0);
+  double share = taken_share(account, body, push, gained);
+  for (int k = 0; k < 6; ++k) {
+    io->brace[k] = -share * push[k];
+  }
+  hapi_v3_scale(1.0 - share, push, not_taken);
+  double held = held_share(account, body, not_taken, gained, io->falls);
+  hapi_v3_scale(1.0 - held, io->falls, io->unheld);
 }
 
 static uint32_t braced_high(const hapi_account *account)
@@ -93,11 +137,9 @@ void hapi_brace_find(const hapi_account *account)
     dBodyID body = braced_body(account, slot);
     hapi_slot_account *of = hapi_account_of(account, i);
     memset(of->brace, 0, sizeof of->brace);
+    memset(of->unheld, 0, sizeof of->unheld);
     if (body != NULL) {
-      double share = taken_share(account, body, slot->exchanged, of->before);
-      for (int k = 0; k < 6; ++k) {
-        of->brace[k] = -share * slot->exchanged[k];
-      }
+      brace_find(account, body, slot->exchanged, of);
     }
   }
 }

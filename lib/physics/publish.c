@@ -203,6 +203,9 @@ static bool fill_body(const publishing *p, uint32_t index, hapi_model *model, ha
     if ((slot->flags & HAPI_BODY_MEASURED) == 0) {
       memset(out->b, 0, sizeof out->b); /* the loop knows it better, or nobody measured it */
     }
+    if ((slot->flags & (HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN)) == 0) {
+      hapi_v3_copy(of->unheld, out->b);
+    }
     if ((slot->flags & HAPI_BODY_OWNED) != 0 && dBodyGetNumJoints(body) == 0) {
       hapi_v3_copy(of->falls, out->b); /* over the age of the model, when it comes in */
     }

@@ -2,6 +2,7 @@
  * SPDX-License-Identifier: MIT */
 #include "physics/reconcile.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/alloc.h"
@@ -10,6 +11,10 @@
 
 /* Where the loop's world and the global world meet (paper section 6,
  * docs/decisions/step-ends-now.md). */
+
+/* How a body outside of the range comes up to where ODE has it. */
+#define CATCH_SHARE 0.5 /* of the way, in a step: all of it swings at 20 Hz */
+#define CATCH_SPEED 0.1 /* m/s, at most */
 
 bool hapi_account_create(hapi_account *account, const hapi_cycle *cycle, hapi_world *world,
                          const hapi_slots *slots)
@@ -345,6 +350,40 @@ static const hapi_state_body *moved_by_loop(const hapi_account *account, uint32_
   return linear ? in : NULL;
 }
 
+/* Of model CONTACT, outside of the range: the loop pushes the body, and knows little of what holds
+ * it up. */
+static bool is_pushed_outside(const hapi_account *account, uint32_t index)
+{
+  const uint32_t others = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
+  const hapi_body_slot *slot = &account->slots->bodies[index];
+  return account->cycle->model == HAP_MODEL_CONTACT && slot->pushed && (slot->flags & others) == 0;
+}
+
+/* m, how far the loop has the body below where ODE has it: it sinks as if nothing held it up. How
+ * it is pushed aside the loop knows better. down: unit, or 0 without a weight. */
+static double body_sank(const hapi_slot_account *of, dBodyID body, const hap_pose *loop,
+                        double out_down[3])
+{
+  double way[3];
+  double weight = hapi_v3_norm(of->falls);
+  if (!(weight > 0.0)) {
+    memset(out_down, 0, 3 * sizeof *out_down);
+    return 0.0;
+  }
+  hapi_v3_scale(1.0 / weight, of->falls, out_down);
+  hapi_v3_sub(loop->position, dBodyGetPosition(body), way);
+  return hapi_v3_dot(way, out_down);
+}
+
+/* io: the velocity that the loop is to take. The next residual takes it back. */
+static void add_catch_up(const hapi_account *account, const hapi_slot_account *of, dBodyID body,
+                         const hap_pose *loop, double io[3])
+{
+  double down[3];
+  double speed = CATCH_SHARE / account->cycle->step_s * body_sank(of, body, loop, down);
+  hapi_v3_madd(io, -fmin(fmax(speed, -CATCH_SPEED), CATCH_SPEED), down, io);
+}
+
 /* Eq. 14. The global step had the same impulse from the pointers as the loop; where it came to
  * another velocity, the linear model missed something: an impact, a change of friction. What was
  * found before and is still on its way to the loop does not count twice. */
@@ -366,6 +405,9 @@ void hapi_reconcile_residual(hapi_account *account)
     }
     hapi_v3_copy(in->twist.linear, loop);
     hapi_v3_copy(in->twist.angular, loop + 3);
+    if (is_pushed_outside(account, i)) {
+      add_catch_up(account, of, body, &in->pose, there);
+    }
     for (int k = 0; k < 6; ++k) {
       of->residual[k] = state_scale(account) * there[k] - loop[k] + in->residual[k];
     }
@@ -384,7 +426,13 @@ void hapi_reconcile_overwrite(const hapi_account *account)
     const hapi_state_body *in = moved_by_loop(account, i);
     dBodyID body = hapi_account_body(account, slot);
     if (in != NULL && body != NULL && slot->pushed) {
-      const double *p = in->pose.position;
+      double p[3];
+      hapi_v3_copy(in->pose.position, p);
+      if (is_pushed_outside(account, i)) {
+        double down[3];
+        double sank = body_sank(hapi_account_of(account, i), body, &in->pose, down);
+        hapi_v3_madd(p, -sank, down, p);
+      }
       dBodySetPosition(body, p[0], p[1], p[2]);
       dBodySetQuaternion(body, in->pose.quat_wxyz);
     }
