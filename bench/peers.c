@@ -33,6 +33,10 @@
 #define SLEEP_SETTLE_S 0.8     /* until all sleep */
 #define FIRST_WITHIN 0.1       /* of ODE's force while friction holds the box */
 #define REST_MOST 5e-4         /* m, way of a box that nobody touches */
+#define USUAL_PILE 100         /* boxes that a session has places for by default */
+#define BODIES_MOST 1024
+#define CONTACTS_MOST 8192.0
+#define BRICK_CONTACTS 40.0
 #define CONTESTANTS_MOST 8
 #define SIZES_MOST 8
 #define ROWS_MOST 256
@@ -134,6 +138,16 @@ static double row_physics_hz(const peers_row *row)
 
 /* ---- a case ---- */
 
+/* As an application would for a pile of more than a session has places for. Bricks touch on all
+ * sides, at 20 points, and others are near. */
+static void session_room(const peers_case *of, peers_session_setting *io)
+{
+  if (strcmp(of->world, "pile") == 0 && of->bodies > USUAL_PILE) {
+    io->range_bodies = of->bodies < BODIES_MOST ? of->bodies : BODIES_MOST;
+    io->contacts = (int)fmin(BRICK_CONTACTS * of->bodies, CONTACTS_MOST);
+  }
+}
+
 static hap_status row_run(bench *b, const peers_row *row, const peer_world *world, peers_run *out)
 {
   const peer_engine *engine = row->who->engine;
@@ -141,6 +155,7 @@ static hap_status row_run(bench *b, const peers_row *row, const peer_world *worl
   if (engine == NULL) {
     peers_session_setting setting = {
         .physics_hz = row->who->physics_hz, .haptic_hz = row->of.haptic_hz, .may_sleep = may_sleep};
+    session_room(&row->of, &setting);
     return peers_run_session(b, world, &setting, out);
   }
   peer_setting setting = {1.0 / row->of.haptic_hz, engine->iterations, may_sleep, false};

@@ -179,6 +179,9 @@ static hap_status session_open(bench *b, size_t ticks, session_bed *bed)
   if (bed->setting->range_bodies > 0) {
     def.max_bodies = bed->setting->range_bodies;
   }
+  if (bed->setting->contacts > 0) {
+    def.max_contacts = bed->setting->contacts;
+  }
   def.expert = &expert;
   research.guard = HAP_GUARD_MEASURE; /* the hand is a prescribed motion */
   def.research = &research;

@@ -34,6 +34,7 @@ typedef struct peers_session_setting {
   bool to_the_end;  /* its own truth: accuracy 1, contact passes at 1 kHz */
   int range_hops;   /* of the range; 0: as by default */
   int range_bodies; /* of the range at most; 0: as by default */
+  int contacts;     /* that there are places for; 0: as by default */
 } peers_session_setting;
 
 /* Model CONTACT at all defaults but for these, in drive LOCKSTEP: everything is done by the calling

@@ -85,6 +85,40 @@ TEST(where_contacts_find_no_room_those_that_touch_are_kept)
 }
 
 /* Without Approx1 friction is a force of its own: there must be none before the touch. */
+/* A block of cubes that touch on all sides. */
+TEST(the_most_places_hold_the_contacts_of_a_block)
+{
+  enum {
+    ALONG = 6,
+    ACROSS = 6,
+    LAYERS = 6
+  };
+  const double pitch = 0.05 - 1e-5;
+  contact_world *w = cw_new(CW_GRAVITY);
+  cw_add_floor(w);
+  for (int i = 0; i < ALONG * ACROSS * LAYERS; ++i) {
+    dMass mass;
+    dBodyID body = dBodyCreate(w->world); /* more of them than w keeps */
+    dMassSetBoxTotal(&mass, 0.1, 0.05, 0.05, 0.05);
+    dBodySetMass(body, &mass);
+    dGeomSetBody(dCreateBox(w->space, 0.05, 0.05, 0.05), body);
+    dBodySetPosition(body, 0.025 + pitch * (i % ALONG), pitch * (i / ALONG % ACROSS),
+                     0.025 - 1e-5 + pitch * (i / ALONG / ACROSS));
+  }
+  w->def.max_bodies = ALONG * ACROSS * LAYERS;
+  w->def.max_contacts = 8192;
+  w->def.physics_hz = 100.0;
+  w->def.haptic_hz = 500.0; /* a tick has time for all */
+  w->hand_def.radius = 0.01;
+  cw_start(w, -0.012, 0.0, 0.025);
+  CHECK(hap_session_advance(w->session, 50) == HAP_OK);
+  hap_stats stats = cw_stats(w);
+  CHECK(stats.model.range_bodies == ALONG * ACROSS * LAYERS && stats.room.range_cut == 0);
+  CHECK(stats.model.capacity_dropped == 0);
+  CHECK(w->session->haptic->tick.contacts.memory_count > 4096);
+  CHECK(stats.faults.count == 0);
+}
+
 TEST(a_box_falls_beside_a_wall_that_it_does_not_touch)
 {
   contact_world *w = cw_new(CW_GRAVITY);

@@ -83,10 +83,10 @@ static int pace_after(hapi_turn *turn, int pace, uint64_t ticks, double updates,
 TEST(a_slow_machine_is_noted_at_once)
 {
   hapi_turn turn = {0};
-  int pace = pace_after(&turn, 0, 100, 40000.0, 15.0);
+  int pace = pace_after(&turn, 0, 100, 80000.0, 7.5);
   CHECK(pace == 1);
-  CHECK(pace_after(&turn, pace, 100, 40000.0, 15.0) == pace);
-  CHECK(pace_after(&turn, 0, 100, 40000.0, 40.0) == 3);
+  CHECK(pace_after(&turn, pace, 100, 80000.0, 7.5) == pace);
+  CHECK(pace_after(&turn, 0, 100, 80000.0, 20.0) == 3);
   CHECK(hapi_room_update_ns(2) > 1.99 * hapi_room_update_ns(0));
   CHECK(hapi_room_work(2, 1000.0) < 0.51 * (double)hapi_room_work(0, 1000.0));
 }
@@ -126,13 +126,13 @@ TEST(idle_ticks_change_nothing)
 TEST(a_fast_machine_is_believed_after_a_while)
 {
   hapi_turn turn = {0};
-  CHECK(pace_after(&turn, 0, 999, 40000.0, 5.0) == 0);
+  CHECK(pace_after(&turn, 0, 999, 80000.0, 2.5) == 0);
   int pace = 0;
   for (int i = 0; i < 60; ++i) {
-    pace = pace_after(&turn, pace, 1000, 40000.0, 5.0);
+    pace = pace_after(&turn, pace, 1000, 80000.0, 2.5);
   }
   CHECK(pace < 0 && pace >= HAPI_PACE_LEAST);
-  CHECK(pace_after(&turn, pace, 1000, 40000.0, 5.0) == pace); /* 6 ns: no more */
+  CHECK(pace_after(&turn, pace, 1000, 80000.0, 2.5) == pace); /* 3 ns: no more */
 }
 
 TEST(the_pace_has_bounds)
@@ -210,9 +210,9 @@ TEST(a_tick_that_has_time_for_all_has_all)
   contact_world *w = pile_new(6, 1000.0);
   pile_end end = pile_push(w, 0.3);
   CHECK(end.stats.model.range_bodies == 77 && end.stats.room.range_cut == 0);
-  CHECK(end.stats.room.range_most == 156 && end.stats.room.turns == 0);
-  CHECK_NEAR(end.stats.room.update_ns, 12.0, 1e-12);
-  CHECK(end.stats.room.tick_work == 66666);
+  CHECK(end.stats.room.range_most == 138 && end.stats.room.turns == 0);
+  CHECK_NEAR(end.stats.room.update_ns, 6.0, 1e-12);
+  CHECK(end.stats.room.tick_work == 133333);
 }
 
 /* A tick of a fifth of the time. The force goes on without a step, and no body is thrown. */

@@ -135,7 +135,7 @@ static const struct {
     WHOLE_FIELD(def, max_bodies, -1),
     WHOLE_FIELD(def, max_bodies, 1025),
     WHOLE_FIELD(def, max_contacts, 0),
-    WHOLE_FIELD(def, max_contacts, 4097),
+    WHOLE_FIELD(def, max_contacts, 8193),
     WHOLE_FIELD(def, max_contacts, -2147483648.0),
     WHOLE_FIELD(def, max_pointers, 0),
     WHOLE_FIELD(def, max_pointers, 17),

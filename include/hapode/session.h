@@ -57,9 +57,9 @@ typedef struct hap_session_def {
   /* bodies that the loop moves itself, 1..1024, default 256. It knows as many again of those
    * around them */
   int32_t max_bodies;
-  /* 1..4096, default 3072: of contact points between bodies and of pointer contacts, this many
+  /* 1..8192, default 3072: of contact points between bodies and of pointer contacts, this many
    * each, and of pairs of nearby geoms three times as many. The contact points nearest to a touch
-   * are kept: give at least 12 for each of max_bodies */
+   * are kept: give at least 12 for each of max_bodies, and 24 where they touch on all sides */
   int32_t max_contacts;
   int32_t max_pointers; /* 1..16, default 4 */
   /* SCHED_FIFO priority of the haptic thread, 0..98, default 80. Physics runs at half of it, the

@@ -195,7 +195,7 @@ typedef struct hap_safety_stats {
 typedef struct hap_room_stats {
   uint64_t unsolved_ticks; /* ticks whose solver left 3 mm/s or more undone */
   uint64_t turns;          /* times that update_ns was set anew */
-  double update_ns;        /* ns, of a row update: by what the ticks took. 12 in drive LOCKSTEP */
+  double update_ns;        /* ns, of a row update: by what the ticks took. 6 in drive LOCKSTEP */
   uint64_t tick_work;      /* row updates that a tick has time for, at that pace */
   uint32_t range_most;     /* bodies that the range may own in the newest model, up to max_bodies */
   uint32_t range_cut;      /* 1: the newest range ends there, and more bodies could be touched */

@@ -13,7 +13,7 @@
 #include "world/cycle.h"
 
 typedef struct hapi_room {
-  /* A row update takes 12 ns times the square root of 2 to the power of it, HAPI_PACE_LEAST ..
+  /* A row update takes 6 ns times the square root of 2 to the power of it, HAPI_PACE_LEAST ..
    * HAPI_PACE_MOST. 0 in drive LOCKSTEP: there no time counts. */
   int pace;
   int margin;      /* steps of the same that solves leave: 0, or more where ticks are late */
@@ -23,6 +23,7 @@ typedef struct hapi_room {
   hapi_tick_work seen;
   uint64_t turns; /* of both */
   double cut_s;   /* that the range has ended there */
+  bool crowded;   /* there: by the places for contacts, and not by time */
 } hapi_room;
 
 /* [control] At the begin of a session. */

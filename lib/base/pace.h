@@ -5,7 +5,7 @@
 
 /* What accuracy/room.h decides, and a recording keeps. */
 
-/* A row update of the solver takes 12 ns times the square root of 2 to the power of it. */
+/* A row update of the solver takes 6 ns times the square root of 2 to the power of it. */
 #define HAPI_PACE_LEAST (-4)
 #define HAPI_PACE_MOST 12
 

@@ -286,8 +286,12 @@ static void cycle_tell(hapi_physics *physics, double seconds)
   }
   if (physics->room.cut_s > LATE_S) {
     hapi_say_once(cycle, &physics->said.cut,
-                  "more bodies touch than a tick has time for: the range ends before them, and the "
-                  "force is approximate (hap_stats.room.range_most)");
+                  physics->room.crowded
+                      ? "bodies touch at more points than there are places for: the range ends "
+                        "before them, and the force is approximate (hap_stats.room.range_most); "
+                        "give more max_contacts"
+                      : "more bodies touch than a tick has time for: the range ends before them, "
+                        "and the force is approximate (hap_stats.room.range_most)");
   }
   if (cycle->state != NULL && cycle->state->unsolved >= UNSOLVED_TICKS) {
     hapi_say_once(cycle, &physics->said.unsolved,

@@ -138,7 +138,7 @@ static hap_status def_check(const hap_session_def *def, hap_detail *detail)
       HAPI_RULE(def, haptic_hz, 100.0, 20000.0),
       HAPI_RULE(def, physics_hz, 1.0, 1000.0),
       HAPI_RULE(def, max_bodies, 1, 1024),
-      HAPI_RULE(def, max_contacts, 1, 4096),
+      HAPI_RULE(def, max_contacts, 1, 8192),
       HAPI_RULE(def, max_pointers, 1, HAP_TRACE_POINTERS_MAX),
       HAPI_RULE(def, rt_priority, 0, HAPI_THREAD_PRIORITY_MOST - 1),
       HAPI_RULE(def, max_steps_per_update, 1, 64),
