@@ -357,6 +357,9 @@ static void row_report(bench *b, const peers_row *r)
            contestant_name(r->who), row_physics_hz(r));
   bench_say("%-36s %8.1f us a ms, p99 %8.1f us, force %s (floor %s), of ODE's %s, of its own %s",
             name, r->us_per_ms, r->p99_us, error, floor, error_ode, error_own);
+  if (r->run.cut) {
+    bench_say("%-36s the range ends after %zu of %d boxes", name, r->run.owned, r->of.bodies);
+  }
   if (b->verify) {
     bench_check(b, isnan(r->first) || fabs(r->first - 1.0) <= FIRST_WITHIN,
                 "%s: first force %.3f of ODE's (bound %g)", name, r->first, FIRST_WITHIN);

@@ -117,7 +117,7 @@ hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_worl
 /* ---- a session ---- */
 
 /* us, since the session began: contact passes, cycles. */
-static void parts_read(const hap_session *session, double out[2], size_t *out_owned)
+static void parts_read(const hap_session *session, double out[2], peers_run *io)
 {
   hap_stats stats;
   if (hap_session_stats(session, &stats, sizeof stats) < HAP_OK) {
@@ -126,7 +126,8 @@ static void parts_read(const hap_session *session, double out[2], size_t *out_ow
   }
   out[0] = stats.contact.us_mean * (double)stats.contact.passes;
   out[1] = 1e3 * stats.physics.ms_mean * (double)stats.physics.steps;
-  *out_owned = stats.model.range_bodies;
+  io->owned = stats.model.range_bodies;
+  io->cut = stats.room.range_cut != 0;
 }
 
 static void parts_note(peers_run *run, const double before[2], const double after[2])
@@ -260,13 +261,13 @@ static hap_status session_run(bench *b, session_bed *bed, peers_run *out)
   }
   session_rest(bed, out);
   double parts[2][2];
-  parts_read(bed->session, parts[0], &out->owned);
+  parts_read(bed->session, parts[0], out);
   double used = bench_used_seconds();
   for (size_t i = 0; i < out->count && status >= HAP_OK; ++i) {
     status = session_tick(b, bed, settle + i, out->force[i]);
   }
   used = bench_used_seconds() - used;
-  parts_read(bed->session, parts[1], &out->owned);
+  parts_read(bed->session, parts[1], out);
   parts_note(out, parts[0], parts[1]);
   if (status >= HAP_OK) {
     status = session_times(b, bed, out);

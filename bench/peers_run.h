@@ -22,6 +22,7 @@ typedef struct peers_run {
   double rest;   /* m, farthest way of a box from its begin while all settled */
   size_t asleep; /* boxes, at the end of settling */
   size_t owned;  /* boxes of the loop at the end; of an engine 0 */
+  bool cut;      /* of a session: its range ends there, and more boxes touch */
 } peers_run;
 
 hap_status peers_run_engine(bench *b, const peer_engine *engine, const peer_world *world,
