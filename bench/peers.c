@@ -36,7 +36,7 @@
 #define USUAL_PILE 100         /* boxes that a session has places for by default */
 #define BODIES_MOST 1024
 #define CONTACTS_MOST 8192.0
-#define BRICK_CONTACTS 40.0
+#define BRICK_CONTACTS 24.0
 #define CONTESTANTS_MOST 8
 #define SIZES_MOST 8
 #define ROWS_MOST 256
