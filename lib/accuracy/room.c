@@ -24,7 +24,7 @@
 #define TICK_SHARE 0.8     /* of the period; the rest is for devices, messages and late wake-ups */
 #define RANGE_SHARE 0.75   /* of that: sweeps beyond the fewest, and ticks that take longer */
 #define ROWS_PER_BODY 40.0 /* at the start: of a body in a pile, with some room */
-#define PLACED_ROWS_PER_BODY 60.0 /* and of bricks: no place is worse than no time */
+#define PLACED_ROWS_PER_BODY 60.0 /* at the start, for places: a brick with 20 contacts */
 #define ROWS_PER_CONTACT 3.0
 #define PLACES_SHARE 0.9 /* contacts that are near and do not touch need places too */
 #define BODIES_LEAST 16u

@@ -134,8 +134,8 @@ static bool goes_before(const hapi_hider *hider, const hapi_local_contact *c, ui
   return hider->depth > c->ramp.depth || (hider->depth == c->ramp.depth && hider->contact < index);
 }
 
-/* Surely: of many things side by side most are, and need not be asked for the nearest of their
- * points. */
+/* True: the point is surely not on the hider's shape. The nearest point of the shape need not be
+ * computed then. */
 static bool is_far(const hapi_hider *hider, const double point[3])
 {
   double way[3];

@@ -13,7 +13,7 @@
  * docs/decisions/step-ends-now.md). */
 
 /* How a body outside of the range comes up to where ODE has it. */
-#define CATCH_SHARE 0.5 /* of the way, in a step: all of it swings at 20 Hz */
+#define CATCH_SHARE 0.5 /* of the way, in a step: with all of it, piles swing at 20 Hz */
 #define CATCH_SPEED 0.1 /* m/s, at most */
 
 bool hapi_account_create(hapi_account *account, const hapi_cycle *cycle, hapi_world *world,
@@ -350,8 +350,8 @@ static const hapi_state_body *moved_by_loop(const hapi_account *account, uint32_
   return linear ? in : NULL;
 }
 
-/* Of model CONTACT, outside of the range: the loop pushes the body, and knows little of what holds
- * it up. */
+/* Of a body outside of the range, model CONTACT: the loop pushes it, and does not know the floor or
+ * the bodies that hold it up. */
 static bool is_pushed_outside(const hapi_account *account, uint32_t index)
 {
   const uint32_t others = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
