@@ -7,7 +7,6 @@
 #include "tests/tap.h"
 
 #include "haptic/haptic_internal.h"
-#include "local/body_stay.h"
 #include "session/session_internal.h"
 #include "tests/contact_world.h"
 
@@ -89,13 +88,10 @@ TEST(nothing_is_left_where_all_is_asked_for)
   CHECK(f.bounded == 0 && f.unsolved == 0);
 }
 
-/* Rows go on while their bodies, cubes, go less than so far: in one tick of two at 50 um each, and
- * in 8 of 9 at 10. */
+/* Rows go on while their bodies do not turn, however fast the hand is, as all cubes go together. */
 TEST(rows_that_go_on_count_as_kept)
 {
-  double way = hapi_stay_flat_way(0.5 * EDGE);
-  CHECK(way > 5e-5 && way <= 1e-4);
-  CHECK(row_push(0.5, 2.0 * way / 1e-3).kept < 0.1);
-  CHECK_NEAR(row_push(0.5, SPEED).kept, 0.5, 0.05);
-  CHECK_NEAR(row_push(0.5, 0.01).kept, 0.87, 0.05);
+  CHECK(row_push(0.5, 0.01).kept > 0.95);
+  CHECK(row_push(0.5, SPEED).kept > 0.95);
+  CHECK(row_push(0.5, 10.0 * SPEED).kept > 0.95);
 }

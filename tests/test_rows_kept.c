@@ -15,11 +15,9 @@
 
 static const double corner[3] = {0.1, 0.08, -0.05}; /* half edges */
 
-static hapi_model_body *box_add(double mass)
+static hapi_model_body *box_of(uint32_t slot, double mass)
 {
-  f.model->model = HAP_MODEL_CONTACT;
-  begin_model();
-  hapi_model_body *body = add_body(0);
+  hapi_model_body *body = add_body(slot);
   body->flags = HAPI_BODY_OWNED;
   body->mass = mass;
   for (int i = 0; i < 3; ++i) {
@@ -30,6 +28,14 @@ static hapi_model_body *box_add(double mass)
   body->max_angular_speed = HUGE_VAL;
   body->pose.position[2] = OPEN - corner[2];
   return body;
+}
+
+/* The only body, so far. */
+static hapi_model_body *box_add(double mass)
+{
+  f.model->model = HAP_MODEL_CONTACT;
+  begin_model();
+  return box_of(0, mass);
 }
 
 /* The four lower corners of the box on the floor, whose face is fixed. The message is written where
@@ -61,8 +67,10 @@ static void patches_fill(hapi_patches *patches, double mu, uint64_t first_number
                       .max_push = HUGE_VAL};
 }
 
-static double ball;  /* m, radius of the box's corners */
-static bool swapped; /* the box is the second body of its contacts, the floor the first */
+static double ball;    /* m, radius of the box's corners */
+static bool swapped;   /* the box is the second body of its contacts, the floor the first */
+static bool on_box;    /* points of the floor on the face of the box */
+static bool on_second; /* the floor is the second box's upper face */
 
 static void contact_swap(hapi_patch_contact *io)
 {
@@ -85,6 +93,12 @@ static void contacts_adopt(double mu, uint64_t first_number)
   for (uint32_t i = 0; i < patches->contact_count; ++i) {
     hapi_patch_contact *c = &hapi_patches_contacts(patches)[i];
     c->ball_a = ball;
+    c->touch = on_box ? HAPI_TOUCH_FACE_A : c->touch;
+    if (on_second) {
+      c->body_b = 1;
+      c->generation_b = 1;
+      c->core_b[2] = -corner[2];
+    }
     if (swapped) {
       contact_swap(c);
     }
@@ -253,21 +267,84 @@ TEST(a_body_that_goes_far_in_a_tick_is_placed_in_each)
   CHECK(r.error < 1e-15 && r.least > -1e-15);
 }
 
-/* Past 3e-5 m where a corner is round, past 1e-4 m where all is flat, or what is 4e-3 of the body's
- * radius of gyration. */
+/* m, of a contact of the box that is flat. */
+static double flat_way(void)
+{
+  double radius = hapi_v3_norm(corner) / sqrt(3.0); /* of a box, by its half edges */
+  return fmax(HAPI_STAY_WAY, fmin(HAPI_STAY_FLAT_SHARE * radius, HAPI_STAY_FLAT_WAY));
+}
+
+/* Ticks with rows made anew, of so many: the first, and each in which the way is past the most. */
+static int anew_expected(double way, double speed, int ticks)
+{
+  int each = (int)(way / (T * speed)) + 1;
+  return (ticks + each - 1) / each;
+}
+
+/* A corner goes on flat ground as far as it likes, a point of the ground on the box past 1e-4 m, or
+ * what is 4e-3 of the body's radius of gyration, and a round corner past 3e-5 m. */
 TEST(what_is_flat_goes_farther_than_what_is_curved)
 {
   static const double twist[6] = {4.5e-3, 0.0, 0.0, 0.0, 0.0, 0.0};
-  double radius = hapi_v3_norm(corner) / sqrt(3.0); /* of a box, by its half edges */
-  double way = fmax(HAPI_STAY_WAY, fmin(HAPI_STAY_FLAT_SHARE * radius, HAPI_STAY_FLAT_WAY));
-  for (int turn = 0; turn < 2; ++turn) {
-    ball = turn == 0 ? 0.0 : 0.5 * OPEN;
-    int each = (int)((turn == 0 ? way : HAPI_STAY_WAY) / (T * twist[0])) + 1; /* ticks */
-    follow_result r = gap_follow(twist, 0.03, 600);
-    CHECK_SAY(r.anew == (600 + each - 1) / each, "%d, each %d", r.anew, each);
+  static const double fast[6] = {0.3, -0.4, 0.0, 0.0, 0.0, 0.0};
+  follow_result r = gap_follow(twist, 0.03, 600);
+  CHECK_SAY(r.anew == 1, "%d", r.anew);
+  r = gap_follow(fast, 0.03, 600);
+  CHECK_SAY(r.anew == 1, "%d", r.anew);
+  CHECK_SAY(r.error < 3e-9 && r.least > -1e-15, "%g %g", r.error, r.least);
+  for (int round = 0; round < 2; ++round) {
+    on_box = round == 0;
+    ball = on_box ? 0.0 : 0.5 * OPEN;
+    int anew = anew_expected(on_box ? flat_way() : HAPI_STAY_WAY, twist[0], 600);
+    r = gap_follow(twist, 0.03, 600);
+    CHECK_SAY(r.anew == anew, "%d of %d", r.anew, anew);
     CHECK_SAY(r.error < 3e-9 && r.least > -1e-15, "%g %g", r.error, r.least);
   }
+  on_box = false;
   ball = 0.0;
+}
+
+/* Ticks with rows made anew, of a box over another one that also goes. */
+static int anew_on_second(const double twist[6], const double second[6], int ticks)
+{
+  int anew = 0;
+  set_up();
+  f.tick.hashing = false;
+  hapi_model_body *upper = box_add(MASS);
+  memcpy(&upper->twist, twist, sizeof upper->twist);
+  hapi_model_body *lower = box_of(1, MASS);
+  lower->pose.position[2] = corner[2];
+  memcpy(&lower->twist, second, sizeof lower->twist);
+  f.model->force_drift = 0.03;
+  on_second = true;
+  model_adopt();
+  floor_adopt(0.5);
+  for (int k = 0; k < ticks; ++k) {
+    double open = f.bodies[0].pose.position[2] - f.bodies[1].pose.position[2] + 2.0 * corner[2];
+    ticks_run(1);
+    REQUIRE(f.tick.rows.solver.row_count == 12);
+    CHECK_NEAR(-T * f.rows[0].target, open, 3e-9);
+    anew += f.tick.rows.kept != f.tick.rows.solver.row_count;
+  }
+  on_second = false;
+  return anew;
+}
+
+/* As bricks that a hand shoves: the way counts between the two. */
+TEST(bodies_that_go_together_keep_their_rows)
+{
+  static const double fast[6] = {0.3, -0.4, 0.2, 0.0, 0.0, 0.0};
+  double slips[6] = {fast[0], fast[1] + 4.5e-3, fast[2], 0.0, 0.0, 0.0};
+  double closes[6] = {fast[0], fast[1], fast[2] - 4.5e-4, 0.0, 0.0, 0.0};
+  double turns[6] = {fast[0], fast[1], fast[2], 0.0, 0.0, 0.01};
+  CHECK(anew_on_second(fast, fast, 600) == 1);
+  int anew = anew_on_second(slips, fast, 600);
+  CHECK_SAY(anew == anew_expected(flat_way(), 4.5e-3, 600), "%d", anew);
+  CHECK(anew_on_second(fast, slips, 600) == anew);
+  anew = anew_on_second(closes, fast, 600);
+  CHECK_SAY(anew == anew_expected(flat_way(), 4.5e-4, 600), "%d", anew);
+  anew = anew_on_second(turns, fast, 600);
+  CHECK_SAY(anew > 20, "%d", anew);
 }
 
 TEST(the_way_goes_by_the_size_of_the_body)

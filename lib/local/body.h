@@ -55,17 +55,18 @@ typedef struct hapi_body_still {
   double free[6]; /* velocity after a tick in which nothing touched it */
 } hapi_body_still;
 
-/* Since when the body has hardly moved, see body_stay.h. */
+/* Since when the body has hardly turned, see body_stay.h. A tick reads the first three of each
+ * contact's bodies. */
 typedef struct hapi_body_stay {
   uint64_t number; /* no other stay of any body has it; 0: none */
-  uint32_t flags;  /* this and the next three: at its begin */
+  double moved[6]; /* m, rad about world axes, from the pose at its begin to that of this tick */
+  bool slow;       /* may be about to rest */
+  bool waiting;    /* this and the next three: at its begin */
+  uint32_t flags;
   uint32_t row;
-  bool waiting;
-  bool curved; /* it has or had a contact with a round part, or of crossing edges */
   hap_pose pose;
-  double most_way;  /* m, of each component, before it ends */
-  double most_turn; /* rad, likewise */
-  double moved[6];  /* m, rad about world axes, from that pose to the one of this tick */
+  double most_way;  /* m, against another body, while a contact of both is flat */
+  double most_turn; /* rad, of each component, before the stay ends */
   double speed;     /* m/s, sum of the components' sizes */
   double spin;      /* rad/s, likewise */
   hapi_body_still still;

@@ -3,17 +3,19 @@
 #ifndef HAPODE_LOCAL_BODY_STAY_H
 #define HAPODE_LOCAL_BODY_STAY_H
 
-/* Which bodies are where they were: what was made from their poses need not be made anew. */
+/* Which bodies are where they were: what was made from their poses need not be made anew. A body that
+ * only goes, and does not turn, stays: its contacts see how far it goes against the other one. */
 
 #include <math.h>
 
 #include "local/body.h"
 
-/* So far a body may go, and gaps of what was made from its pose follow by their first derivatives.
- * Nothing adds up: the motion counts from the kept pose, not from the tick before. Of a slow body,
- * which may be about to rest, the second derivatives stay below 1e-10 m for arms of a metre. */
-#define HAPI_STAY_SLOW_WAY 1e-6  /* m, of each component */
-#define HAPI_STAY_SLOW_TURN 1e-5 /* rad, likewise */
+/* So far a body may turn, and two may go against each other, and the gap of their contact follows by
+ * its first derivatives. Nothing adds up: the motion counts from where the contact was made, not
+ * from the tick before. Of slow bodies, which may be about to rest, the second derivatives stay below
+ * 1e-10 m for arms of a metre. */
+#define HAPI_STAY_SLOW_WAY 1e-6  /* m */
+#define HAPI_STAY_SLOW_TURN 1e-5 /* rad, of each component */
 /* Of others they stay below 1e-8 m. Normals and arms are not turned: a thousandth of friction.
  * A way along or across flat faces has no second derivative. It ends where an arm is wrong by a
  * share of the body's size. */
@@ -33,9 +35,16 @@
 #define HAPI_STAY_FLAGS \
   (HAPI_BODY_OWNED | HAPI_BODY_DRIVEN | HAPI_BODY_RESTING | HAPI_BODY_MEASURED)
 
+/* NULL: the static world. */
+static inline const hapi_body_stay *hapi_stay_of(const hapi_local_body *body)
+{
+  static const hapi_body_stay ground = {.number = HAPI_STAY_STATIC, .slow = true};
+  return body != NULL ? &body->stay : &ground;
+}
+
 static inline uint64_t hapi_stay_number(const hapi_local_body *body)
 {
-  return body == NULL ? HAPI_STAY_STATIC : body->stay.number;
+  return hapi_stay_of(body)->number;
 }
 
 /* What was made for the body is to be made anew. */
@@ -45,12 +54,10 @@ static inline void hapi_stay_end(hapi_local_body *body)
 }
 
 /* m along a row of the Jacobian since the stay began: its linear and angular part. */
-static inline double hapi_stay_moved(const hapi_local_body *body, const double linear[3],
+static inline double hapi_stay_moved(const hapi_body_stay *stay, const double linear[3],
                                      const double angular[3])
 {
-  return body == NULL
-             ? 0.0
-             : hapi_v3_dot(linear, body->stay.moved) + hapi_v3_dot(angular, body->stay.moved + 3);
+  return hapi_v3_dot(linear, stay->moved) + hapi_v3_dot(angular, stay->moved + 3);
 }
 
 /* m, about its centre; 0: it does not answer by its mass, or is not placed yet. The trace of the
@@ -74,28 +81,18 @@ static inline double hapi_stay_turn(double radius)
   return hapi_max(HAPI_STAY_SLOW_TURN, hapi_min(turn, HAPI_STAY_TURN));
 }
 
-/* m, likewise, while no contact of the body is curved. */
+/* m, of contacts that are flat. */
 static inline double hapi_stay_flat_way(double radius)
 {
   return hapi_max(HAPI_STAY_WAY, hapi_min(HAPI_STAY_FLAT_SHARE * radius, HAPI_STAY_FLAT_WAY));
 }
 
-/* A contact of the body is curved: also the stay that has begun ends sooner. */
-static inline void hapi_stay_curve(hapi_local_body *body)
-{
-  if (body != NULL) {
-    body->stay.curved = true;
-    body->stay.most_way = hapi_min(body->stay.most_way, HAPI_STAY_WAY);
-  }
-}
-
-/* False: too far, or not finite. */
+/* False: turned too far, or not finite. */
 static inline bool hapi_stay_measure(const hapi_body_stay *stay, const hap_pose *to,
                                      double out_moved[6])
 {
   const double *k = stay->pose.quat_wxyz;
   const double *q = to->quat_wxyz;
-  bool slow = stay->speed < HAPI_STAY_SPEED && stay->spin < HAPI_STAY_SPIN;
   double axis[3];
   double cosine = k[0] * q[0] + hapi_v3_dot(k + 1, q + 1); /* q and -q are the same */
   hapi_v3_sub(to->position, stay->pose.position, out_moved);
@@ -103,12 +100,10 @@ static inline bool hapi_stay_measure(const hapi_body_stay *stay, const hap_pose 
   hapi_v3_madd(axis, k[0], q + 1, axis);
   hapi_v3_madd(axis, -q[0], k + 1, axis);
   hapi_v3_scale(2.0 * cosine, axis, out_moved + 3);
-  double way = hapi_max(fabs(out_moved[0]), hapi_max(fabs(out_moved[1]), fabs(out_moved[2])));
   double angle = hapi_max(fabs(out_moved[3]), hapi_max(fabs(out_moved[4]), fabs(out_moved[5])));
   double sum = out_moved[0] + out_moved[1] + out_moved[2] + out_moved[3] + out_moved[4] +
                out_moved[5]; /* hapi_max loses NaN */
-  return way <= (slow ? HAPI_STAY_SLOW_WAY : stay->most_way) &&
-         angle <= (slow ? HAPI_STAY_SLOW_TURN : stay->most_turn) && cosine * cosine > 0.5 &&
+  return angle <= (stay->slow ? HAPI_STAY_SLOW_TURN : stay->most_turn) && cosine * cosine > 0.5 &&
          sum == sum;
 }
 
@@ -121,6 +116,7 @@ static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
   uint32_t flags = body->flags & HAPI_STAY_FLAGS;
   stay->speed = fabs(v[0]) + fabs(v[1]) + fabs(v[2]);
   stay->spin = fabs(w[0]) + fabs(w[1]) + fabs(w[2]);
+  stay->slow = stay->speed < HAPI_STAY_SPEED && stay->spin < HAPI_STAY_SPIN;
   if (stay->number != HAPI_STAY_UNKNOWN && stay->flags == flags && stay->row == body->row &&
       stay->waiting == body->waiting && hapi_stay_measure(stay, &body->pose, stay->moved)) {
     return;
@@ -131,8 +127,7 @@ static inline void hapi_stay_follow(hapi_bodies *bodies, hapi_local_body *body)
   stay->waiting = body->waiting;
   stay->pose = body->pose;
   double radius = bodies->exact ? 0.0 : hapi_stay_radius(body);
-  double way = stay->curved ? HAPI_STAY_WAY : hapi_stay_flat_way(radius);
-  stay->most_way = bodies->exact ? HAPI_STAY_SLOW_WAY : way;
+  stay->most_way = bodies->exact ? HAPI_STAY_SLOW_WAY : hapi_stay_flat_way(radius);
   stay->most_turn = bodies->exact ? HAPI_STAY_SLOW_TURN : hapi_stay_turn(radius);
   memset(stay->moved, 0, sizeof stay->moved);
 }

@@ -6,6 +6,9 @@
 /* Contacts between bodies, model CONTACT: the contact thread's newest set, with the impulses of the
  * one before. */
 
+#include <stdalign.h>
+
+#include "base/alloc.h"
 #include "sync/messages.h"
 
 /* What the rows of a tick leave to the next one. */
@@ -16,18 +19,11 @@ enum {
   HAPI_KEPT_ROWS
 };
 
-/* Holds while both bodies stay, see body_stay.h, and no tick was without rows. */
+/* Holds while both bodies stay and go no farther against each other, see body_stay.h, and no tick
+ * was without rows. */
 typedef struct hapi_contact_kept {
   uint64_t stay_a;
   uint64_t stay_b;
-  double gap;     /* m, at the poses where the stays began */
-  double reach_a; /* APART: m, by which the body's turn moves the contact, or more */
-  double reach_b;
-  double normal[3]; /* the normal's row of the Jacobian: a's linear part, b's is opposite; */
-  double turn_a[3]; /* and its angular parts: the gap follows without a look at the row */
-  double turn_b[3];
-  double slope[2]; /* ROWS: hapi_touch_spot's along the directions of the frictions */
-  double least;    /* ROWS: m, this */
   uint32_t body_a; /* slots */
   uint32_t body_b;
   uint32_t first;   /* ROWS: where they stand, and how many */
@@ -39,17 +35,28 @@ typedef struct hapi_contact_kept {
   bool slides;  /* ROWS: slope is not 0 */
   bool all;     /* ROWS: one for each part that the surface has, whether the bodies touch or not */
   uint8_t what; /* HAPI_KEPT_ */
+  double apart[3];  /* m: how far a had gone from b when this was made, */
+  double way2;      /* m^2, and how far from there they may go */
+  double gap;       /* m, at the poses where the stays began */
+  double normal[3]; /* the normal's row of the Jacobian: a's linear part, b's is opposite; */
+  double turn_a[3]; /* and its angular parts: the gap follows without a look at the row */
+  double turn_b[3];
+  double least;    /* ROWS: m, this */
+  double slope[2]; /* ROWS: hapi_touch_spot's along the directions of the frictions */
+  double reach_a;  /* APART: m, by which the body's turn moves the contact, or more */
+  double reach_b;
 } hapi_contact_kept;
 
-/* What is kept of a contact from tick to tick, and from one set of patches to the next. */
+/* What is kept of a contact from tick to tick, and from one set of patches to the next. A tick
+ * reads its first three cache lines. */
 typedef struct hapi_contact_memory {
+  alignas(HAPI_CACHE_LINE) double impulse[3]; /* N s: normal, friction 1 and 2 */
+  hapi_contact_kept kept;
   uint64_t key;
   uint64_t number;  /* see hapi_patch_contact */
   uint64_t surface; /* hash of it: the message before is not ours any more */
   double core_a[3];
-  double impulse[3]; /* N s: normal, friction 1 and 2 */
-  double held[3];    /* N s, on the first body in a tick, while it is still: see body_still.h */
-  hapi_contact_kept kept;
+  double held[3]; /* N s, on the first body in a tick, while it is still: see body_still.h */
 } hapi_contact_memory;
 
 typedef struct hapi_body_contacts {

@@ -12,8 +12,8 @@
 #include "local/touch_place.h"
 
 /* Contacts between bodies as rows of the solver. A contact is placed anew from the poses of its
- * bodies, and while both stay where they were its rows stay as well: only the gap follows, along
- * the Jacobian of the normal's row. What a row asks for is what the world's own contact joints
+ * bodies, and while both stay, and hardly move against each other, its rows stay as well: only the
+ * gap follows, along the Jacobian of the normal's row. What a row asks for is what the world's own contact joints
  * would ask for (ODE's contact constraint), at the step of the tick. */
 
 /* 84 degrees of slope. More than that may push without bound along a contact that hardly touches:
@@ -370,8 +370,10 @@ void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bo
  * short. */
 #define SLOPE_LEAST 2e-4
 
+#define SLOW_WAY2 (HAPI_STAY_SLOW_WAY * HAPI_STAY_SLOW_WAY)
+
 /* m, more than the gap of a contact without rows is off by: a touch that slides has a slope of 0.2
- * at most, over the ways of both bodies from end to end. */
+ * at most, over the way of both bodies against each other. */
 #define APART_SLACK 2e-4
 
 static double reach_of(const hapi_local_body *body, const double point[3])
@@ -397,27 +399,49 @@ static void moment_of(const hapi_local_body *body, const double point[3], double
   }
 }
 
+/* The stays of its bodies, and how far a has gone from b since they began. */
+typedef struct contact_stays {
+  const hapi_body_stay *a;
+  const hapi_body_stay *b;
+  double apart[3]; /* m */
+} contact_stays;
+
+static void stays_find(const hapi_local_body *a, const hapi_local_body *b, contact_stays *out)
+{
+  out->a = hapi_stay_of(a);
+  out->b = hapi_stay_of(b);
+  hapi_v3_sub(out->a->moved, out->b->moved, out->apart);
+}
+
 /* m: how much farther the bodies of a kept contact have gone from each other along the normal since
  * their stays began. */
-static double normal_grown(const hapi_contact_kept *kept, const hapi_local_body *a,
-                           const hapi_local_body *b)
+static double normal_grown(const hapi_contact_kept *kept, const contact_stays *stays)
 {
-  double opposite[3];
-  hapi_v3_scale(-1.0, kept->normal, opposite);
-  return hapi_stay_moved(a, kept->normal, kept->turn_a) +
-         hapi_stay_moved(b, opposite, kept->turn_b);
+  return hapi_v3_dot(kept->normal, stays->apart) + hapi_v3_dot(kept->turn_a, stays->a->moved + 3) +
+         hapi_v3_dot(kept->turn_b, stays->b->moved + 3);
+}
+
+/* Whether both bodies stay, and are near enough to where they were against each other. */
+static bool kept_holds(const hapi_contact_kept *kept, const contact_stays *stays)
+{
+  double way[3];
+  bool slow = stays->a->slow && stays->b->slow;
+  double most2 = slow ? hapi_min(SLOW_WAY2, kept->way2) : kept->way2;
+  hapi_v3_sub(stays->apart, kept->apart, way);
+  return stays->a->number == kept->stay_a && stays->b->number == kept->stay_b &&
+         hapi_v3_dot(way, way) <= most2;
 }
 
 /* m: how much wider the gap of kept rows has become. rows: looked at only where the contact slides
  * over a slope. */
 static double gap_grown(const hapi_contact_kept *kept, const hapi_row *rows,
-                        const hapi_local_body *a, const hapi_local_body *b)
+                        const contact_stays *stays)
 {
-  double grown = normal_grown(kept, a, b);
+  double grown = normal_grown(kept, stays);
   for (int i = 0; kept->slides && i < 2; ++i) {
     const hapi_row *row = &rows[1 + i];
-    grown += kept->slope[i] *
-             (hapi_stay_moved(a, row->ja, row->ja + 3) + hapi_stay_moved(b, row->jb, row->jb + 3));
+    grown += kept->slope[i] * (hapi_stay_moved(stays->a, row->ja, row->ja + 3) +
+                               hapi_stay_moved(stays->b, row->jb, row->jb + 3));
   }
   return grown;
 }
@@ -433,18 +457,44 @@ static bool keep_slope(const placed_contact *c, const hapi_row *rows, hapi_conta
   return !out->slides || out->count == 3;
 }
 
+/* A corner or an edge on a face. The point of crossing edges goes farther than their bodies. */
+static bool is_flat(const hapi_patch_contact *in)
+{
+  return (in->touch == HAPI_TOUCH_FACE_A || in->touch == HAPI_TOUCH_FACE_B) && in->ball_a == 0.0 &&
+         in->ball_b == 0.0 && in->rim_a == 0.0 && in->rim_b == 0.0;
+}
+
+/* m: how far the bodies may go against each other. What is fixed on a body may slide over a face of
+ * the static world as far as it likes, as nothing of its rows changes. */
+static double contact_way(const placed_contact *c)
+{
+  double way_a = c->a != NULL ? c->a->stay.most_way : HUGE_VAL;
+  double way_b = c->b != NULL ? c->b->stay.most_way : HUGE_VAL;
+  double way = hapi_min(way_a, way_b);
+  bool on_static = (c->b == NULL && c->in->touch == HAPI_TOUCH_FACE_B) ||
+                   (c->a == NULL && c->in->touch == HAPI_TOUCH_FACE_A);
+  if (!is_flat(c->in)) {
+    return hapi_min(HAPI_STAY_WAY, way);
+  }
+  return on_static && c->in->slide == HAPI_SLIDE_NONE ? HUGE_VAL : way;
+}
+
 /* For the next tick. first: of its rows, if it has some. */
 static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t what,
                          uint32_t first, hapi_contact_kept *out)
 {
   const uint32_t approx = HAPI_SURFACE_APPROX1_1 | HAPI_SURFACE_APPROX1_2;
+  contact_stays stays;
+  stays_find(c->a, c->b, &stays);
   out->what = HAPI_KEPT_NOTHING;
-  out->stay_a = hapi_stay_number(c->a);
-  out->stay_b = hapi_stay_number(c->b);
+  out->stay_a = stays.a->number;
+  out->stay_b = stays.b->number;
   if (out->stay_a == HAPI_STAY_UNKNOWN || out->stay_b == HAPI_STAY_UNKNOWN) {
     return;
   }
   out->what = what;
+  hapi_v3_copy(stays.apart, out->apart);
+  out->way2 = contact_way(c) * contact_way(c);
   out->body_a = c->in->body_a;
   out->body_b = c->in->body_b;
   if (what == HAPI_KEPT_APART) {
@@ -453,7 +503,7 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
     hapi_v3_copy(c->normal, out->normal);
     moment_of(c->a, c->point, 1.0, c->normal, out->turn_a);
     moment_of(c->b, c->point, -1.0, c->normal, out->turn_b);
-    out->gap = c->gap - APART_SLACK - normal_grown(out, c->a, c->b);
+    out->gap = c->gap - APART_SLACK - normal_grown(out, &stays);
   } else if (what == HAPI_KEPT_ROWS) {
     const hapi_row *normal = &rows->solver.rows[first];
     out->first = first;
@@ -468,20 +518,19 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
     hapi_v3_copy(c->normal, out->normal);
     hapi_v3_copy(normal->ja + 3, out->turn_a);
     hapi_v3_copy(normal->jb + 3, out->turn_b);
-    out->gap = FOLLOW_MARGIN + c->gap - gap_grown(out, normal, c->a, c->b);
+    out->gap = FOLLOW_MARGIN + c->gap - gap_grown(out, normal, &stays);
   }
 }
 
-static double most_speed(const hapi_local_body *body, double reach)
+static double most_speed(const hapi_body_stay *stay, double reach)
 {
-  return body != NULL ? body->stay.speed + reach * body->stay.spin : 0.0;
+  return stay->speed + reach * stay->spin;
 }
 
-static bool still_apart(const hapi_contact_kept *kept, const hapi_local_body *a,
-                        const hapi_local_body *b, double period)
+static bool still_apart(const hapi_contact_kept *kept, const contact_stays *stays, double period)
 {
-  double speed = most_speed(a, kept->reach_a) + most_speed(b, kept->reach_b);
-  double gap = kept->gap + normal_grown(kept, a, b);
+  double speed = most_speed(stays->a, kept->reach_a) + most_speed(stays->b, kept->reach_b);
+  double gap = kept->gap + normal_grown(kept, stays);
   return gap > OPEN_FLOOR + OPEN_TICKS * period * speed;
 }
 
@@ -581,20 +630,22 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
   c.index = index;
   c.a = hapi_bodies_at(bodies, kept->body_a);
   c.b = hapi_bodies_at(bodies, kept->body_b);
-  if (hapi_stay_number(c.a) != kept->stay_a || hapi_stay_number(c.b) != kept->stay_b) {
+  contact_stays stays;
+  stays_find(c.a, c.b, &stays);
+  if (!kept_holds(kept, &stays)) {
     return false;
   }
   if (kept->what == HAPI_KEPT_IDLE) {
     return true;
   }
   if (kept->what == HAPI_KEPT_APART) {
-    return still_apart(kept, c.a, c.b, facts->period);
+    return still_apart(kept, &stays, facts->period);
   }
   if (!rows_stand(rows, kept, index) || !impulses_finite(memory)) {
     return false;
   }
   c.surface = &hapi_patches_surfaces(contacts->patches)[kept->surface];
-  c.gap = kept->gap + gap_grown(kept, &rows->solver.rows[kept->first], c.a, c.b);
+  c.gap = kept->gap + gap_grown(kept, &rows->solver.rows[kept->first], &stays);
   if (rows_stay(rows, kept, c.gap, facts)) {
     HAPI_ASSERT(rows_ask_alike(rows, &c, kept));
     rows->solver.row_count += kept->count;
@@ -603,13 +654,6 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
     return true;
   }
   return rows_go_on(rows, &c, memory, facts, sample);
-}
-
-/* A corner or an edge on a face. The point of crossing edges goes farther than their bodies. */
-static bool is_flat(const hapi_patch_contact *in)
-{
-  return (in->touch == HAPI_TOUCH_FACE_A || in->touch == HAPI_TOUCH_FACE_B) && in->ball_a == 0.0 &&
-         in->ball_b == 0.0 && in->rim_a == 0.0 && in->rim_b == 0.0;
 }
 
 static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies, uint32_t index,
@@ -625,10 +669,6 @@ static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies
     bool near = is_near(&c, facts->period);
     if (near) {
       add_contact(rows, &c, memory, facts, sample);
-    }
-    if (!is_flat(c.in)) {
-      hapi_stay_curve(c.a);
-      hapi_stay_curve(c.b);
     }
     if (c.follows) {
       contact_keep(rows, &c, near ? HAPI_KEPT_ROWS : HAPI_KEPT_APART, first, &memory->kept);
@@ -647,9 +687,10 @@ bool hapi_contact_is_near(const hapi_body_contacts *contacts, const hapi_bodies 
   if (kept->what != HAPI_KEPT_NOTHING) {
     const hapi_local_body *a = hapi_bodies_at(bodies, kept->body_a);
     const hapi_local_body *b = hapi_bodies_at(bodies, kept->body_b);
-    bool stay = hapi_stay_number(a) == kept->stay_a && hapi_stay_number(b) == kept->stay_b;
-    if (stay && (kept->what == HAPI_KEPT_IDLE || kept->what == HAPI_KEPT_ROWS ||
-                 still_apart(kept, a, b, facts->period))) {
+    contact_stays stays;
+    stays_find(a, b, &stays);
+    if (kept_holds(kept, &stays) && (kept->what == HAPI_KEPT_IDLE || kept->what == HAPI_KEPT_ROWS ||
+                                     still_apart(kept, &stays, facts->period))) {
       return kept->what == HAPI_KEPT_ROWS;
     }
   }
