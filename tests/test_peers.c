@@ -362,6 +362,25 @@ TEST(a_large_pile_is_pushed_as_ode_alone_pushes_it)
   peer_world_destroy(&world);
 }
 
+/* The range ended after 182 of them. Then bricks sagged before the hand came. */
+TEST(a_tick_has_time_for_300_bricks)
+{
+  bench b = {.out = "."};
+  peer_world world;
+  peers_run run;
+  const peers_session_setting session = {
+      .physics_hz = 20.0, .haptic_hz = 1000.0, .range_bodies = 300, .contacts = 24 * 300};
+  REQUIRE(peer_world_create("pile", 300, &world));
+  REQUIRE(peers_run_session(&b, &world, &session, &run) >= HAP_OK);
+  printf("# %zu in the loop, rest %.3f mm, peak %.2f N\n", run.owned, 1e3 * run.rest,
+         peers_run_peak(&run));
+  CHECK(run.owned == 300 && !run.cut);
+  CHECK(run.rest < 1e-4);
+  CHECK(peers_run_peak(&run) > 12.5); /* plain ODE has 13.8 */
+  peers_run_free(&run);
+  peer_world_destroy(&world);
+}
+
 /* The first force is that of 1 kHz: spring and damper of the hand do not know of ticks. */
 TEST(a_hand_of_4_khz_has_the_same_first_force)
 {

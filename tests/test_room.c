@@ -215,10 +215,10 @@ TEST(a_tick_that_has_time_for_all_has_all)
   CHECK(end.stats.room.tick_work == 133333);
 }
 
-/* A tick of a fifth of the time. The force goes on without a step, and no body is thrown. */
+/* A tick of an eighth of the time. The force goes on without a step, and no body is thrown. */
 TEST(a_tick_without_time_for_all_has_as_many_as_it_can)
 {
-  contact_world *w = pile_new(6, 5000.0);
+  contact_world *w = pile_new(6, 8000.0);
   pile_end end = pile_push(w, 0.4);
   printf("# range %u, least %u, jump %g N, peak %g N, residual %g m/s\n",
          end.stats.model.range_bodies, end.range_least, end.jump, end.peak,

@@ -3,17 +3,17 @@
 #ifndef HAPODE_LOCAL_BODY_STAY_H
 #define HAPODE_LOCAL_BODY_STAY_H
 
-/* Which bodies are where they were: what was made from their poses need not be made anew. A body that
- * only goes, and does not turn, stays: its contacts see how far it goes against the other one. */
+/* Which bodies are where they were: what was made from their poses need not be made anew. A body
+ * that only goes, and does not turn, stays: its contacts see how far it goes against the other. */
 
 #include <math.h>
 
 #include "local/body.h"
 
-/* So far a body may turn, and two may go against each other, and the gap of their contact follows by
- * its first derivatives. Nothing adds up: the motion counts from where the contact was made, not
- * from the tick before. Of slow bodies, which may be about to rest, the second derivatives stay below
- * 1e-10 m for arms of a metre. */
+/* So far a body may turn, and two may go against each other, and the gap of their contact follows
+ * by its first derivatives. Nothing adds up: the motion counts from where the contact was made, not
+ * from the tick before. Of slow bodies, which may be about to rest, the second derivatives stay
+ * below 1e-10 m for arms of a metre. */
 #define HAPI_STAY_SLOW_WAY 1e-6  /* m */
 #define HAPI_STAY_SLOW_TURN 1e-5 /* rad, of each component */
 /* Of others they stay below 1e-8 m. Normals and arms are not turned: a thousandth of friction.

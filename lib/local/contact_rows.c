@@ -13,8 +13,8 @@
 
 /* Contacts between bodies as rows of the solver. A contact is placed anew from the poses of its
  * bodies, and while both stay, and hardly move against each other, its rows stay as well: only the
- * gap follows, along the Jacobian of the normal's row. What a row asks for is what the world's own contact joints
- * would ask for (ODE's contact constraint), at the step of the tick. */
+ * gap follows, along the Jacobian of the normal's row. What a row asks for is what the world's own
+ * contact joints would ask for (ODE's contact constraint), at the step of the tick. */
 
 /* 84 degrees of slope. More than that may push without bound along a contact that hardly touches:
  * where a large island is not solved to the end within a tick, what lets go then gives energy. */

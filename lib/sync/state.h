@@ -73,11 +73,11 @@ typedef struct hapi_tick_load {
 } hapi_tick_load;
 
 /* The work of a tick is counted in row updates of the solver: what it takes to make a row, or to
- * keep it, and the least that a row costs, of which a quarter is made and all is swept twice in
- * each of two solves. */
+ * keep it, and what a row costs where bodies are pushed: one of twenty is made, and each is swept
+ * two to three times. */
 #define HAPI_ROW_MAKING 8u
 #define HAPI_ROW_KEEPING 2u
-#define HAPI_ROW_WORK 8u
+#define HAPI_ROW_WORK 5u
 
 /* Of ticks of model CONTACT. */
 typedef struct hapi_tick_work {
