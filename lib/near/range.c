@@ -68,7 +68,7 @@ static bool range_enqueue(hapi_nearby *nearby, uint32_t known)
   visit->hops = range->hops;
   visit->after_s = dBodyIsEnabled(body->body) ? 0.0 : range->after_s;
   local->wanted = true;
-  local->linked = false;
+  local->linked = local->carried = false;
   local->mass = hapi_body_mass(body->body);
   local->flags = dBodyIsKinematic(body->body)  ? HAPI_BODY_DRIVEN
                  : !dBodyIsEnabled(body->body) ? HAPI_BODY_RESTING
@@ -606,7 +606,9 @@ static void take_links(hapi_nearby *nearby)
       continue;
     }
     if (link->body != NULL) {
-      nearby->slots.bodies[known_body(nearby, link->known)->slot].linked = true;
+      hapi_body_slot *other = &nearby->slots.bodies[known_body(nearby, link->known)->slot];
+      other->linked = true;
+      other->carried = other->carried || (range->ends && hapi_link_is_carried(nearby, link));
     }
     if (link_has_parts(link)) {
       add_parts(nearby, link);
@@ -779,6 +781,8 @@ void hapi_range_walk(hapi_nearby *nearby, uint32_t hit_count)
   range->near->contact_hz = nearby->cycle->settings.contact_hz;
   range->near->always = hapi_wish_is_on(nearby->cycle->wishes, HAP_EFFECT_PASSES);
   range->refused = range->cut = false;
+  range->ends = nearby->cycle->settings.range_hops != HAP_RANGE_ALL ||
+                nearby->world->bodies.seen_count > hapi_range_most(nearby->cycle);
   range->hops = 0;
   range->after_s = 0.0;
   range->awake_count = 0;

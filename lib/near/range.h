@@ -85,6 +85,7 @@ typedef struct hapi_range {
   uint32_t seeds;                   /* neighbours: the first of the queue */
   uint32_t bounces;                 /* surfaces of this walk that give back speed */
   bool refused;                     /* a body within the hops that the loop cannot own */
+  bool ends;                        /* the range may end among bodies that touch */
   bool cut;                         /* a tick has no time for more bodies: settings.range_bodies */
   double fastest;                   /* m/s, of the pointers */
   uint32_t awake[HAPI_RANGE_AWAKE]; /* bodies that may move by themselves */
@@ -110,6 +111,10 @@ static inline uint32_t hapi_range_most(const hapi_cycle *cycle)
   uint32_t most = cycle->config->max_bodies;
   return cycle->settings.range_bodies < most ? cycle->settings.range_bodies : most;
 }
+
+/* carried.c */
+/* Whether the other body of a link rests on the link's own one. */
+bool hapi_link_is_carried(const hapi_nearby *nearby, const hapi_link *link);
 
 /* Room for so many bodies more; without it the range is noted to end there. */
 bool hapi_range_has_room(hapi_nearby *nearby, uint32_t bodies);

@@ -40,6 +40,7 @@ typedef struct hapi_body_slot {
   /* Model CONTACT. */
   bool loop_owned; /* in the newest message: ODE's state is the loop's, and is not stepped */
   bool linked;     /* scratch: a body of the range may touch it */
+  bool carried;    /* likewise: it rests on one, as far as the range may end there */
   double gain_taken[6];
   double exchanged[6]; /* N, N m: mean wrench from the loop in the last interval */
 } hapi_body_slot;

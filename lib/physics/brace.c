@@ -21,7 +21,10 @@
  *
  *   f (1 + w.f / f.f),   w = dv / H - f - (1 - share) P / m,   between 0 and f
  *
- * The step says all of it, so nothing has to be tested. */
+ * The step says all of it, so nothing has to be tested. Of a body that was not outside in that step
+ * it is guessed: hapi_brace_guess. */
+
+#define GUESSED_LOAD 100.0 /* weights of the body, that it may carry in its first interval */
 
 static dBodyID braced_body(const hapi_account *account, const hapi_body_slot *slot)
 {
@@ -138,8 +141,21 @@ void hapi_brace_find(const hapi_account *account)
     hapi_slot_account *of = hapi_account_of(account, i);
     memset(of->brace, 0, sizeof of->brace);
     memset(of->unheld, 0, sizeof of->unheld);
+    of->outside = body != NULL;
     if (body != NULL) {
       brace_find(account, body, slot->exchanged, of);
     }
+  }
+}
+
+/* What rests on a body of the loop has its weight there, and what carries one stands. */
+void hapi_brace_guess(const hapi_body_slot *slot, dBodyID body, hapi_slot_account *io)
+{
+  dMass mass;
+  dBodyGetMass(body, &mass);
+  if (slot->carried) {
+    hapi_v3_copy(io->falls, io->unheld);
+  } else {
+    hapi_v3_scale(-GUESSED_LOAD * mass.mass, io->falls, io->brace);
   }
 }

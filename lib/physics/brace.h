@@ -11,4 +11,7 @@
 void hapi_brace_begin(const hapi_account *account);
 void hapi_brace_find(const hapi_account *account);
 
+/* Of a body that was not outside in that step. */
+void hapi_brace_guess(const hapi_body_slot *slot, dBodyID body, hapi_slot_account *io);
+
 #endif

@@ -6,6 +6,7 @@
 #include "base/assert.h"
 #include "base/clock.h"
 #include "base/vec.h"
+#include "physics/brace.h"
 #include "physics/physics_internal.h"
 
 /* The local model: what the loop is told after a step. Each part writes its own into the message.
@@ -37,11 +38,17 @@ static double keep_per_tick(const hapi_cycle *cycle, double damping)
   return pow(1.0 - share, hapi_tick_ratio(cycle));
 }
 
-static void fill_brace(const hapi_slot_account *of, hapi_model_body *out)
+static void fill_brace(const hapi_body_slot *slot, dBodyID body, hapi_slot_account *of,
+                       hapi_model_body *out)
 {
   const uint32_t others = HAPI_BODY_OWNED | HAPI_BODY_MEASURED | HAPI_BODY_DRIVEN;
-  bool any = hapi_v3_norm(of->brace) > 0.0 || hapi_v3_norm(of->brace + 3) > 0.0;
-  if (any && (out->flags & others) == 0) {
+  if ((out->flags & others) != 0) {
+    return;
+  }
+  if (!of->outside) {
+    hapi_brace_guess(slot, body, of);
+  }
+  if (hapi_v3_norm(of->brace) > 0.0 || hapi_v3_norm(of->brace + 3) > 0.0) {
     out->flags |= HAPI_BODY_BRACED;
     memcpy(out->brace, of->brace, sizeof out->brace);
   }
@@ -92,7 +99,7 @@ static void fill_dynamics(const publishing *p, const hapi_body_slot *slot,
   out->max_angular_speed = dBodyGetMaxAngularSpeed(body);
   memcpy(out->gain_taken, slot->gain_taken, sizeof out->gain_taken);
   memcpy(out->response, answer->response, sizeof out->response);
-  fill_brace(of, out);
+  fill_brace(slot, body, of, out);
 }
 
 static void vector_scale(double scale, double *io, int count)

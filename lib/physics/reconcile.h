@@ -33,6 +33,7 @@ typedef struct hapi_slot_account {
   int64_t owned_until_ns; /* that the loop's last state was taken for */
   double before[6];       /* m/s, rad/s: in ODE before the global step, of a body outside */
   double brace[6];        /* of the message, as the next */
+  bool outside;           /* of the range, in the last step */
   double unheld[3];       /* m/s^2, of a body outside: what of `falls` the world does not hold */
   double falls[3];        /* m/s^2, by gravity and the application's force */
 } hapi_slot_account;
