@@ -418,6 +418,35 @@ static double load_on_floor(void)
   return sum;
 }
 
+/* As fast as a hand may shove it. Each tick takes mu g T of its speed, and its rows are those of
+ * the first tick. */
+TEST(a_box_that_slides_on_the_floor_is_slowed_by_friction_and_keeps_its_rows)
+{
+  const double mu = 0.5;
+  const double speed = 3.0;
+  const int ticks = 500;
+  double way = 0.0;
+  set_up();
+  f.tick.hashing = false;
+  hapi_model_body *body = box_add(MASS);
+  body->pose.position[2] = -corner[2];
+  body->gravity[2] = -9.81;
+  body->twist.linear[0] = speed;
+  f.model->force_drift = 0.03;
+  model_adopt();
+  floor_adopt(mu);
+  for (int k = 1; k <= ticks; ++k) {
+    ticks_run(1);
+    way += T * (speed - k * mu * 9.81 * T);
+    CHECK(k == 1 || f.tick.rows.kept == f.tick.rows.solver.row_count);
+  }
+  const double *at = f.bodies[0].pose.position;
+  CHECK_NEAR(at[0], way, 1e-6);
+  CHECK_NEAR(at[1], 0.0, 1e-9);
+  CHECK_NEAR(at[2], -corner[2], 1e-8);
+  CHECK_NEAR(load_on_floor(), 9.81 * MASS, 1e-6);
+}
+
 TEST(another_mass_or_friction_makes_rows_anew)
 {
   box_rest();
