@@ -365,6 +365,11 @@ TEST(a_slow_body_is_placed_as_often_as_at_accuracy_1)
   CHECK_SAY(r.anew == exact.anew && r.anew > 8, "%d and %d", r.anew, exact.anew);
   r = gap_follow(not_slow, 0.03, 1000);
   CHECK_SAY(r.anew == 1, "%d", r.anew); /* the first tick */
+  static const double slips[6] = {0.8 * HAPI_STAY_SPEED, 0.0, 0.0, 0.0, 0.0, 0.0};
+  on_box = true;
+  r = gap_follow(slips, 0.03, 1000);
+  CHECK_SAY(r.anew == anew_expected(HAPI_STAY_SLOW_WAY, slips[0], 1000), "%d", r.anew);
+  on_box = false;
 }
 
 /* A box of edges a, b, c: the mean square of the distance from its centre is
