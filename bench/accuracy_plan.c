@@ -136,7 +136,7 @@ static accuracy_point point_of(const writer *w, hap_model model, const char *kno
   return p;
 }
 
-static bool is_same(const accuracy_point *a, const accuracy_point *b)
+static inline bool is_same(const accuracy_point *a, const accuracy_point *b) /* of an assert */
 {
   return a->def.session.model == b->def.session.model && strcmp(a->knob, b->knob) == 0 &&
          a->value == b->value && a->physics_hz == b->physics_hz;
