@@ -28,7 +28,7 @@
 #define TRUTH_ITERATIONS 1000
 #define PHYSICS_HZ_MOST 1000.0 /* of a session */
 #define TRUTH_BOXES_MOST 100   /* larger worlds take a truth too long */
-#define LARGE_ITERATIONS 50    /* of ODE's there: it differs by 0.5 % from one of 200 */
+#define LARGE_ITERATIONS 50    /* of ODE's there: 150 boxes are 0.8 % off one of 200 */
 #define LARGE_BOXES_MOST 400
 #define NUDGE 1e-7           /* m: single precision at 1 m still tells it */
 #define APART_TRUTH_BOXES 10 /* nothing but the floor touches the one that the hand meets */

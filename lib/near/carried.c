@@ -3,9 +3,9 @@
 #include "base/vec.h"
 #include "near/near.h"
 
-/* What rests on a body of the loop, by its geoms' boxes: at the border of the range that is held by
- * the loop, and other bodies by the world. In the interval in which a body comes to the border
- * nobody has seen which. */
+/* Which bodies rest on the loop's, judged by the boxes of their geoms. At the border of the range
+ * the loop holds those, and the world holds all others. For the first interval of a body at the
+ * border this is a guess (brace.h); later it is measured. */
 
 #define TOUCH 1e-3 /* m, between boxes */
 
@@ -32,16 +32,6 @@ static double box_top(const dReal box[6], const double up[3])
   return top;
 }
 
-/* A link may be to what comes near later. */
-static bool boxes_touch(const dReal a[6], const dReal b[6])
-{
-  bool touch = true;
-  for (int k = 0; k < 3; ++k) {
-    touch = touch && a[2 * k] <= b[2 * k + 1] + TOUCH && b[2 * k] <= a[2 * k + 1] + TOUCH;
-  }
-  return touch;
-}
-
 bool hapi_link_is_carried(const hapi_nearby *nearby, const hapi_link *link)
 {
   double up[3];
@@ -52,6 +42,10 @@ bool hapi_link_is_carried(const hapi_nearby *nearby, const hapi_link *link)
   }
   dGeomGetAABB(link->own, own);
   dGeomGetAABB(link->other, other);
-  return boxes_touch(own, other) &&
-         hapi_v3_dot(up, dBodyGetPosition(link->body)) > box_top(own, up);
+  bool above = hapi_v3_dot(up, dBodyGetPosition(link->body)) > box_top(own, up);
+  for (int k = 0; k < 3; ++k) { /* a link may be to what comes near later */
+    own[2 * k] -= TOUCH;
+    own[2 * k + 1] += TOUCH;
+  }
+  return above && hapi_boxes_meet(own, other);
 }
