@@ -33,7 +33,7 @@ static void check_more(const hapi_settings *a, const hapi_settings *b)
   CHECK(a->contact_hz <= b->contact_hz);
   CHECK(a->max_sweeps == 0 && b->max_sweeps == 0);
   CHECK(value_is_endless(a->range_hops) <= value_is_endless(b->range_hops));
-  CHECK(a->row_updates <= b->row_updates);
+  CHECK(a->row_updates <= b->row_updates && a->updates_per_row <= b->updates_per_row);
   CHECK(a->iterations <= b->iterations);
   CHECK(a->shapes <= b->shapes);
   CHECK(a->reuse >= b->reuse);

@@ -155,6 +155,31 @@ TEST(the_pace_has_bounds)
   }
 }
 
+/* ---- the most of a solve ---- */
+
+static uint32_t updates_at(int pace, uint32_t rows, int percent)
+{
+  const hapi_knobs knobs = {.range_hops = HAP_BY_ACCURACY, .iterations = HAP_BY_ACCURACY};
+  const hapi_physics_config config = {.haptic_hz = 1.0 / PERIOD};
+  const hapi_room room = {.pace = pace};
+  hapi_state state = {.work = {.ticks = 1, .rows = rows}};
+  const hapi_cycle cycle = {.config = &config, .state = &state};
+  hapi_settings settings;
+  hapi_dial_settings(&knobs, percent, percent, PERIOD, &settings);
+  return hapi_room_updates(&room, &cycle, &settings);
+}
+
+/* Two sweeps of 20000 rows are 40000 updates: with no more than 20000, what is due stays due. */
+TEST(many_rows_get_as_many_updates_each_as_few)
+{
+  CHECK(updates_at(0, 3000, HAPI_DIAL_DEFAULT) == updates_at(0, 0, HAPI_DIAL_DEFAULT));
+  CHECK(updates_at(0, 19000, HAPI_DIAL_DEFAULT) == 6 * 19000);
+  CHECK(updates_at(0, 60000, HAPI_DIAL_DEFAULT) == hapi_room_work(0, 1.0 / PERIOD));
+  CHECK(updates_at(2, 19000, HAPI_DIAL_DEFAULT) == hapi_room_work(2, 1.0 / PERIOD));
+  CHECK(updates_at(0, 19000, 100) == hapi_room_work(0, 1.0 / PERIOD));
+  CHECK(updates_at(0, 19000, 0) == 300); /* who gives accuracy up has it so */
+}
+
 /* ---- sessions ---- */
 
 /* Three layers of cubes, the lowest of side x side. */
@@ -167,8 +192,10 @@ static contact_world *pile_new(int side, double haptic_hz)
   for (int layer = 0; layer < 3; ++layer) {
     for (int i = 0; i < (side - layer) * (side - layer); ++i) {
       int width = side - layer;
-      cw_add_cube(w, 0.2, EDGE, pitch * (i / width + 0.5 * layer),
-                  pitch * (i % width - side / 2 + 0.5 * layer), (layer + 0.5) * (EDGE - 1e-3));
+      int along = i / width;
+      int aside = i % width - side / 2;
+      cw_add_cube(w, 0.2, EDGE, pitch * (along + 0.5 * layer), pitch * (aside + 0.5 * layer),
+                  (layer + 0.5) * (EDGE - 1e-3));
     }
   }
   w->def.haptic_hz = haptic_hz;

@@ -18,7 +18,8 @@ typedef struct tick_row {
   int from; /* percent */
   double contact_hz;
   uint32_t row_updates;
-  double force_drift; /* 1/s */
+  uint32_t updates_per_row; /* where these are more, and a tick has time for them */
+  double force_drift;       /* 1/s */
   int32_t range_hops;
   bool shapes;
 } tick_row;
@@ -29,15 +30,15 @@ typedef struct tick_row {
  * new ground. A shorter range is wrong where bodies carry each other, a plane instead of a shape
  * where they roll: the last resort of a budget. */
 static const tick_row tick_rows[] = {
-    {0, 50.0, 300, 0.1, 1, false},
-    {10, 50.0, 300, 0.1, 4, true},
-    {20, 100.0, 600, 0.1, HAP_RANGE_ALL, true},
-    {30, 100.0, 1250, 0.1, HAP_RANGE_ALL, true},
-    {40, 200.0, 2500, 0.05, HAP_RANGE_ALL, true},
-    {50, 200.0, 20000, 0.03, HAP_RANGE_ALL, true},
-    {70, 333.0, 20000, 0.01, HAP_RANGE_ALL, true},
-    {80, 500.0, 20000, 0.003, HAP_RANGE_ALL, true},
-    {100, 1000.0, 20000, 0.0, HAP_RANGE_ALL, true},
+    {0, 50.0, 300, 0, 0.1, 1, false},
+    {10, 50.0, 300, 0, 0.1, 4, true},
+    {20, 100.0, 600, 0, 0.1, HAP_RANGE_ALL, true},
+    {30, 100.0, 1250, 0, 0.1, HAP_RANGE_ALL, true},
+    {40, 200.0, 2500, 0, 0.05, HAP_RANGE_ALL, true},
+    {50, 200.0, 20000, 6, 0.03, HAP_RANGE_ALL, true},
+    {70, 333.0, 20000, 8, 0.01, HAP_RANGE_ALL, true},
+    {80, 500.0, 20000, 12, 0.003, HAP_RANGE_ALL, true},
+    {100, 1000.0, 20000, 64, 0.0, HAP_RANGE_ALL, true},
 };
 
 typedef struct physics_row {
@@ -90,6 +91,7 @@ void hapi_dial_settings(const hapi_knobs *knobs, int tick_percent, int physics_p
   out->max_sweeps = knobs->max_sweeps > 0 ? (uint32_t)knobs->max_sweeps : 0;
   double most = TICK_SHARE * period_s / UPDATE_S;
   out->row_updates = most < tick->row_updates ? (uint32_t)most : tick->row_updates;
+  out->updates_per_row = tick->updates_per_row;
   out->force_drift = tick->force_drift;
   out->range_hops = knobs->range_hops != HAP_BY_ACCURACY ? knobs->range_hops : tick->range_hops;
   out->shapes = tick->shapes;

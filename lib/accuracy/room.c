@@ -49,6 +49,16 @@ uint64_t hapi_room_work(int pace, double haptic_hz)
   return (uint64_t)(1e9 * TICK_SHARE / haptic_hz / hapi_room_update_ns(pace));
 }
 
+uint32_t hapi_room_updates(const hapi_room *room, const hapi_cycle *cycle,
+                           const hapi_settings *settings)
+{
+  uint64_t most = hapi_room_work(room->pace + room->margin, cycle->config->haptic_hz);
+  bool told = cycle->state != NULL && cycle->state->work.ticks > 0;
+  uint64_t wanted = told ? settings->updates_per_row * (uint64_t)cycle->state->work.rows : most;
+  wanted = settings->updates_per_row == 0 ? 0 : wanted < most ? wanted : most;
+  return wanted > settings->row_updates ? (uint32_t)wanted : settings->row_updates;
+}
+
 /* That a tick has time for. */
 static double rows_of_time(int pace, const hapi_physics_config *config)
 {

@@ -38,6 +38,11 @@ void hapi_room_follow(hapi_room *room, const hapi_cycle *cycle, bool cut);
 double hapi_room_update_ns(int pace);
 /* Row updates that a tick has time for. */
 uint64_t hapi_room_work(int pace, double haptic_hz);
+/* Row updates that a solve may make: as the dial says, or so many for each row of the newest tick,
+ * where many rows need more and a tick has time for them. Before the first tick is told there may
+ * be any number of rows. */
+uint32_t hapi_room_updates(const hapi_room *room, const hapi_cycle *cycle,
+                           const hapi_settings *settings);
 
 /* ---- inner: the decisions, for tests ---- */
 

@@ -29,7 +29,7 @@
 #define REFUSED_FOR 10u        /* models, in which an island that found no room is not looked at */
 #define ROWS_PER_PAIR 3u       /* that comes near: few of them touch */
 #define ROWS_PER_JOINT 6u
-#define UPDATES_PER_ROW 16u /* with a reserve of as many again */
+#define UPDATES_RESERVED 16u /* with a reserve of as many again */
 
 static const hapi_known_body *known_body(const hapi_nearby *nearby, uint32_t known)
 {
@@ -205,7 +205,7 @@ static bool tick_has_room(const hapi_nearby *nearby)
   const hapi_range *range = &nearby->range;
   uint32_t rows = ROWS_PER_PAIR * (range->near->pair_count + nearby->range.ahead.half_pairs / 2) +
                   ROWS_PER_JOINT * range->mechanism.joint_count;
-  return rows <= nearby->cycle->settings.row_updates / UPDATES_PER_ROW;
+  return rows <= nearby->cycle->settings.row_updates / UPDATES_RESERVED;
 }
 
 /* What gathering has noted is undone: the walk that takes the island gathers again. */

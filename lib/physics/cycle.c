@@ -156,6 +156,7 @@ void hapi_physics_fill_settings(hapi_physics *physics)
 {
   hapi_settings *settings = &physics->cycle.settings;
   hapi_dial_fill(&physics->dial, physics->config.haptic_hz, settings);
+  settings->row_updates = hapi_room_updates(&physics->room, &physics->cycle, settings);
   settings->range_bodies = physics->room.bodies;
   hapi_dial_tell(&physics->dial, settings, &physics->counts.own.accuracy);
 }

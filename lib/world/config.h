@@ -28,9 +28,10 @@ typedef struct hapi_knobs {
 typedef struct hapi_settings {
   double contact_hz;
   hap_probe probe;
-  uint32_t max_sweeps;  /* 0: until the system is solved */
-  uint32_t row_updates; /* the most, in a solve of a tick */
-  double force_drift;   /* 1/s, what solves may leave undone of the force on a hand */
+  uint32_t max_sweeps;      /* 0: until the system is solved */
+  uint32_t row_updates;     /* the most, in a solve of a tick */
+  uint32_t updates_per_row; /* that it may make where that is more, and a tick has the time */
+  double force_drift;       /* 1/s, what solves may leave undone of the force on a hand */
   int32_t range_hops;
   uint32_t range_bodies; /* that the range may own: what a tick has time for */
   double iterations;     /* times those of the world; 0: fixed_iterations */
