@@ -25,99 +25,11 @@
 #define TICK_CONTACT_COLUMNS "p99_ns,scene,phase,rows,sweeps,ode_ns,pass_ns"
 #define TICK_CONTACT_EMPTY ",,,,,,"
 
-/* A running session's tick, run alone and put back: what the haptic loop computes from that state,
- * without devices, messages, threads and hash, and without a trace in the session. */
-
-#define TICK_ARRAYS 12
-
-typedef struct tick_array {
-  void *at;
-  size_t bytes;
-} tick_array;
-
-typedef struct tick_state {
-  hapi_tick tick;
-  tick_array arrays[TICK_ARRAYS];
-  unsigned char *bytes; /* of all arrays */
-  size_t capacity;
-} tick_state;
-
-/* So many places of frictions are in use; all that there is room for would fill the caches. */
-static size_t frictions_used(const hapi_touches *touches)
-{
-  size_t used = 0;
-  for (uint32_t i = 0; i < touches->count; ++i) {
-    uint32_t slot = touches->of[i].slot;
-    used = slot != HAPI_SLOT_NONE && slot >= used ? slot + 1 : used;
-  }
-  return used;
-}
-
-/* What a tick takes over from the tick before; all else each tick makes anew. */
-static void tick_list_arrays(const hapi_tick *t, tick_array out[TICK_ARRAYS])
-{
-  const hapi_capacity *c = &t->capacity;
-  const hapi_touches *touches = &t->touches;
-  const tick_array arrays[TICK_ARRAYS] = {
-      {t->pointers.of, c->pointers * sizeof *t->pointers.of},
-      {t->bodies.of, t->bodies.high * sizeof *t->bodies.of},
-      {t->bodies.live, t->bodies.live_count * sizeof *t->bodies.live},
-      {touches->of, touches->count * sizeof *touches->of},
-      {touches->kept, c->contacts * sizeof *touches->kept},
-      {touches->frictions, frictions_used(touches) * sizeof *touches->frictions},
-      {touches->tool.tools, touches->tool.count * sizeof *touches->tool.tools},
-      {touches->tool.pairs, touches->tool.pair_count * sizeof *touches->tool.pairs},
-      {touches->crosses.of, touches->crosses.count * sizeof *touches->crosses.of},
-      {t->contacts.memory, t->contacts.memory_count * sizeof *t->contacts.memory},
-      {t->joints.of, t->joints.count * sizeof *t->joints.of},
-      {t->joints.memory, c->joints * sizeof *t->joints.memory},
-  };
-  memcpy(out, arrays, sizeof arrays);
-}
-
-/* False: no memory. */
-static bool tick_save(const hapi_tick *tick, tick_state *out)
-{
-  size_t needed = 0;
-  size_t used = 0;
-  tick_list_arrays(tick, out->arrays);
-  for (size_t i = 0; i < TICK_ARRAYS; ++i) {
-    needed += out->arrays[i].bytes;
-  }
-  if (needed > out->capacity) {
-    free(out->bytes);
-    out->bytes = malloc(needed);
-    out->capacity = out->bytes != NULL ? needed : 0;
-  }
-  for (size_t i = 0; i < TICK_ARRAYS && out->bytes != NULL; ++i) {
-    memcpy(out->bytes + used, out->arrays[i].at, out->arrays[i].bytes);
-    used += out->arrays[i].bytes;
-  }
-  out->tick = *tick;
-  return out->bytes != NULL;
-}
-
-static void tick_restore(hapi_tick *tick, const tick_state *saved)
-{
-  size_t used = 0;
-  hapi_solver *solver = &tick->rows.solver;
-  if (solver->packs.ahead) {
-    hapi_packs_store(&solver->packs, solver->rows);
-  }
-  *tick = saved->tick;
-  for (size_t i = 0; i < TICK_ARRAYS; ++i) {
-    memcpy(saved->arrays[i].at, saved->bytes + used, saved->arrays[i].bytes);
-    used += saved->arrays[i].bytes;
-  }
-  /* Its arrays are those of the tick that was measured: with the counts of the one before, sweeps
-   * went beyond their ends. */
-  hapi_packs_forget(&solver->packs);
-}
-
 /* The tick of model CONTACT, which carries the contacts between the bodies itself: cubes that touch
- * each other, at rest and pushed. A session runs in lockstep; after each of its ticks the next one
- * is run alone, by turns with plain ODE, which finds the contacts of the same scene in the
- * same state and steps it with 10 iterations. Times are medians over the ticks. */
+ * each other, at rest and pushed. A session runs in lockstep. A tick's time is that of a loop with
+ * its own thread: messages, device and report are part of it, a hash is not. After each of them plain
+ * ODE finds the contacts of the same scene in the same state and steps it with 10 iterations. Times
+ * are medians over the ticks. */
 
 #define CONTACT_WARM_TICKS 300
 #define PASSES 401
@@ -200,7 +112,6 @@ typedef struct tick_bed {
   scene_parameters parameters;
   rig rig;
   bare bare;
-  tick_state saved;
   size_t ticks;            /* to contact_measure */
   double *values[FIGURES]; /* of the ticks */
   double p99_ns;
@@ -211,7 +122,6 @@ static void contact_close(tick_bed *t)
 {
   bare_destroy(&t->bare);
   rig_destroy(&t->rig);
-  free(t->saved.bytes);
   free(t->values[0]);
 }
 
@@ -286,45 +196,33 @@ static hap_status contact_open(bench *b, const tick_case *what, tick_bed *t)
 
 /* ---- measuring ---- */
 
-/* The next tick, run alone. False: no memory. */
-static bool tick_measure_alone(tick_bed *t, size_t i)
+/* Of one tick. The loop takes its messages where it takes them in a thread of its own. */
+static hap_status tick_measure(const tick_bed *t, size_t i)
 {
-  hapi_tick *tick = &t->rig.session->haptic->tick;
-  if (!tick_save(tick, &t->saved)) {
-    return false;
-  }
-  uint64_t sweeps = tick->rows.sweeps;
-  int64_t next_ns = tick->facts.now_ns + (int64_t)llround(1e9 * tick->facts.period);
-  tick->hashing = false; /* only lockstep does */
+  hap_session *session = t->rig.session;
+  hapi_haptic *haptic = session->haptic;
+  hapi_rows *rows = &haptic->tick.rows;
+  uint64_t sweeps = rows->sweeps;
+  haptic->tick.hashing = false; /* only lockstep does */
   int64_t begin_ns = hapi_clock_now();
-  hapi_tick_run(tick, next_ns);
-  t->values[TICK_NS][i] = (double)(hapi_clock_now() - begin_ns);
-  t->values[SWEEPS][i] = (double)(tick->rows.sweeps - sweeps);
-  t->values[ROWS][i] = tick->rows.solver.row_count;
-  for (uint32_t row = 0; row < tick->rows.solver.row_count; ++row) {
-    t->values[CONTACTS][i] += tick->rows.sources[row].part == 0;
+  hapi_haptic_receive(haptic, hap_session_now(session));
+  double receive_ns = (double)(hapi_clock_now() - begin_ns);
+  hap_status status = hap_session_advance(session, 1);
+  t->values[TICK_NS][i] = receive_ns + 1e3 * haptic->time.last_tick_us;
+  t->values[SWEEPS][i] = (double)(rows->sweeps - sweeps);
+  t->values[ROWS][i] = rows->solver.row_count;
+  for (uint32_t row = 0; row < rows->solver.row_count; ++row) {
+    t->values[CONTACTS][i] += rows->sources[row].part == 0;
   }
-  tick_restore(tick, &t->saved);
-  return true;
+  return status;
 }
 
-static double bare_tick(tick_bed *t)
+static void bare_measure(tick_bed *t, size_t i)
 {
   bare_follow(&t->bare, t->rig.scene); /* as it was at the last sync */
-  return 1e9 * bare_cycle(&t->bare, t->rig.session->haptic->tick.facts.period, false);
-}
-
-static bool tick_measure(tick_bed *t, size_t i)
-{
-  if (i % 2 == 0) {
-    t->values[ODE_NS][i] = bare_tick(t);
-  }
+  double seconds = bare_cycle(&t->bare, t->rig.session->haptic->tick.facts.period, false);
+  t->values[ODE_NS][i] = 1e9 * seconds;
   t->values[ODE_CONTACTS][i] = (double)t->bare.contact_count;
-  bool good = tick_measure_alone(t, i);
-  if (i % 2 != 0) {
-    t->values[ODE_NS][i] = bare_tick(t);
-  }
-  return good;
 }
 
 /* Contact passes one after another, from the newest poses. */
@@ -347,10 +245,8 @@ static hap_status contact_measure(bench *b, const tick_case *what, tick_bed *t)
     status = hap_session_advance(t->rig.session, CONTACT_WARM_TICKS);
   }
   for (size_t i = 0; i < t->ticks && status == HAP_OK; ++i) {
-    status = hap_session_advance(t->rig.session, 1);
-    if (!tick_measure(t, i)) {
-      status = bench_fail(b, HAP_ERROR_MEMORY, "no memory for a tick");
-    }
+    status = tick_measure(t, i);
+    bare_measure(t, i);
   }
   if (status != HAP_OK) {
     return status < HAP_OK ? status

@@ -23,6 +23,7 @@
 #define UPDATE_NS 6.0      /* of rows in packs 4 to 5, of joints 7 to 10; a processor of 2.6 GHz */
 #define TICK_SHARE 0.8     /* of the period; the rest is for devices, messages and late wake-ups */
 #define RANGE_SHARE 0.75   /* of that: sweeps beyond the fewest, and ticks that take longer */
+#define SOLVE_SHARE 0.75   /* likewise: a tick may make a second solve */
 #define ROWS_PER_BODY 40.0 /* at the start: of a body in a pile, with some room */
 #define PLACED_ROWS_PER_BODY 60.0 /* at the start, for places: a brick with 20 contacts */
 #define ROWS_PER_CONTACT 3.0
@@ -52,7 +53,8 @@ uint64_t hapi_room_work(int pace, double haptic_hz)
 uint32_t hapi_room_updates(const hapi_room *room, const hapi_cycle *cycle,
                            const hapi_settings *settings)
 {
-  uint64_t most = hapi_room_work(room->pace + room->margin, cycle->config->haptic_hz);
+  double all = (double)hapi_room_work(room->pace + room->margin, cycle->config->haptic_hz);
+  uint64_t most = (uint64_t)(SOLVE_SHARE * all);
   bool told = cycle->state != NULL && cycle->state->work.ticks > 0;
   uint64_t wanted = told ? settings->updates_per_row * (uint64_t)cycle->state->work.rows : most;
   wanted = settings->updates_per_row == 0 ? 0 : wanted < most ? wanted : most;

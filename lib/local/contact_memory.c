@@ -9,9 +9,11 @@
 #include "base/hash.h"
 #include "base/vec.h"
 
-/* New contacts between bodies take over the impulses of the old ones: the solver starts from them,
- * and a stack whose contacts were found anew does not sag. Old and new contacts belong together
- * when they are of the same pair of geoms and near each other on the first body. */
+/* A contact that goes on keeps what it had, also where it comes in another place of the message as
+ * others before it came or went. New contacts between bodies take over the impulses of those that
+ * have ended: the solver starts from them, and a stack whose contacts were found anew does not sag.
+ * Old and new contacts belong together when they are of the same pair of geoms and near each other
+ * on the first body. */
 
 #define MATCH_DISTANCE2 (0.02 * 0.02) /* m^2: farther ones are other contacts */
 #define NO_ENTRY 0u
@@ -70,14 +72,15 @@ static uint64_t surface_hash(const hapi_surface *surface)
   return hash;
 }
 
-/* A contact at the place where it was in the message before keeps its rows as well, if its surface
- * is the same. False: it is another one. */
-static bool memory_goes_on(hapi_contact_memory *memory, const hapi_patch_contact *in,
-                           uint64_t surface, bool *io_changed)
+static bool is_same_contact(const hapi_contact_memory *memory, const hapi_patch_contact *in)
 {
-  if (memory->number != in->number || in->number == 0) {
-    return false;
-  }
+  return memory->number == in->number && in->number != 0;
+}
+
+/* Of a contact that goes on: it keeps its rows as well, if its surface is the same. */
+static void memory_go_on(hapi_contact_memory *memory, const hapi_patch_contact *in,
+                         uint64_t surface, bool *io_changed)
+{
   if (memory->kept.surface != in->surface) {
     memory->kept.surface = in->surface;
   }
@@ -85,6 +88,47 @@ static bool memory_goes_on(hapi_contact_memory *memory, const hapi_patch_contact
     memory->surface = surface;
     memory->kept.what = HAPI_KEPT_NOTHING;
     *io_changed = true;
+  }
+}
+
+/* Whether the rows of the last tick, at the place where they were left, are still the contact's. */
+static bool rows_are_of(const hapi_rows *rows, const hapi_contact_kept *kept, uint32_t index)
+{
+  const hapi_row_source *source = &rows->sources[kept->first];
+  return kept->first + kept->count <= rows->solver.row_count && source->contact == index &&
+         !source->joint && !source->pointer && source->count == kept->count;
+}
+
+/* Out of its place, which another one may come to. */
+static void memory_put_aside(hapi_body_contacts *contacts, uint32_t index, const hapi_rows *rows,
+                             uint32_t *io_count)
+{
+  hapi_contact_memory *aside = &contacts->old_memory[(*io_count)++];
+  *aside = contacts->memory[index];
+  contacts->memory[index].number = 0;
+  if (aside->kept.what == HAPI_KEPT_ROWS && !rows_are_of(rows, &aside->kept, index)) {
+    aside->kept.what = HAPI_KEPT_NOTHING;
+  }
+}
+
+/* What was put aside comes to another place, and its rows with it. False: it is a new contact. */
+static bool memory_come_back(hapi_body_contacts *contacts, uint32_t index,
+                             const hapi_patch_contact *in, const hapi_rows *rows, uint32_t count)
+{
+  hapi_contact_memory *memory = &contacts->memory[index];
+  uint32_t at = first_of(contacts, in->key, count);
+  while (at < count && contacts->old_memory[at].key == in->key &&
+         !is_same_contact(&contacts->old_memory[at], in)) {
+    ++at;
+  }
+  if (at == count || contacts->old_memory[at].key != in->key) {
+    return false;
+  }
+  *memory = contacts->old_memory[at];
+  contacts->old_memory[at].number = 0;
+  hapi_v3_set(contacts->old_memory[at].core_a, HUGE_VAL, HUGE_VAL, HUGE_VAL);
+  for (uint32_t i = 0; memory->kept.what == HAPI_KEPT_ROWS && i < memory->kept.count; ++i) {
+    rows->sources[memory->kept.first + i].contact = index;
   }
   return true;
 }
@@ -153,17 +197,44 @@ static void pair_begin(const hapi_body_contacts *contacts, const hapi_patch_cont
   }
 }
 
-/* What goes on stays where it is and is hardly looked at: most of a thousand contacts do. What ends
- * is put aside, and what is new looks for its impulses there. */
-void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches)
+/* Those of the message that are not in their places, from the first one on: what was put aside, or
+ * new. */
+static void memories_fill(hapi_body_contacts *contacts, hapi_patches *patches, uint32_t first,
+                          const hapi_rows *rows, uint32_t aside)
+{
+  const hapi_patch_contact *in = hapi_patches_contacts(patches);
+  const hapi_surface *surfaces = hapi_patches_surfaces(patches);
+  uint32_t count = patches->contact_count;
+  uint64_t surface = 0;
+  bool ignored;
+  for (uint32_t i = first; aside > 0 && i < count; ++i) {
+    if (i == first || in[i].surface != in[i - 1].surface) {
+      surface = surface_hash(&surfaces[in[i].surface]);
+    }
+    if (contacts->memory[i].number == 0 && memory_come_back(contacts, i, &in[i], rows, aside)) {
+      memory_go_on(&contacts->memory[i], &in[i], surface, &ignored);
+    }
+  }
+  /* Then the new ones: none is to take the impulses of what has come back. */
+  for (uint32_t i = first; i < count; ++i) {
+    if (contacts->memory[i].number == 0) {
+      memory_begin(contacts, i, &in[i], surface_hash(&surfaces[in[i].surface]), aside);
+      pair_begin(contacts, in, i, count);
+    }
+  }
+}
+
+/* What goes on in its place is hardly looked at: most of a thousand contacts do. */
+void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches,
+                              const hapi_rows *rows)
 {
   bool same = contacts->patches != NULL && patches->contents != 0 &&
               patches->contents == contacts->contents &&
               patches->contact_count == contacts->memory_count;
   uint32_t before = contacts->patches != NULL ? contacts->memory_count : 0;
   uint32_t count = patches->contact_count;
-  uint32_t ended = 0;
-  uint32_t first_new = count;
+  uint32_t aside = 0;
+  uint32_t first = count; /* that is not in its place */
   bool changed = before != count;
   const hapi_patch_contact *in = hapi_patches_contacts(patches);
   const hapi_surface *surfaces = hapi_patches_surfaces(patches);
@@ -179,26 +250,21 @@ void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patche
     if (i < count && (i == 0 || in[i].surface != in[i - 1].surface)) {
       surface = surface_hash(&surfaces[in[i].surface]);
     }
-    if (i >= count || !memory_goes_on(memory, &in[i], surface, &changed)) {
-      contacts->old_memory[ended++] = *memory;
-      memory->number = 0;
-      first_new = i < first_new ? i : first_new;
+    if (i < count && is_same_contact(memory, &in[i])) {
+      memory_go_on(memory, &in[i], surface, &changed);
+    } else {
+      memory_put_aside(contacts, i, rows, &aside);
+      first = i < first ? i : first;
     }
   }
-  first_new = before < first_new ? before : first_new;
-  if (ended > 0) {
-    index_old(contacts, ended);
+  for (uint32_t i = before; i < count; ++i) {
+    contacts->memory[i].number = 0;
   }
-  for (uint32_t i = first_new; i < count; ++i) {
-    if (i == first_new || in[i].surface != in[i - 1].surface) {
-      surface = surface_hash(&surfaces[in[i].surface]);
-    }
-    if (i >= before || contacts->memory[i].number == 0) {
-      memory_begin(contacts, i, &in[i], surface, ended);
-      pair_begin(contacts, in, i, count);
-      changed = true;
-    }
+  first = before < first ? before : first;
+  if (aside > 0) {
+    index_old(contacts, aside);
   }
+  memories_fill(contacts, patches, first, rows, aside);
   contacts->memory_count = count;
-  contacts->adopted |= changed;
+  contacts->adopted |= changed || first < count;
 }

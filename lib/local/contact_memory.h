@@ -9,6 +9,7 @@
 #include <stdalign.h>
 
 #include "base/alloc.h"
+#include "local/rows.h"
 #include "sync/messages.h"
 
 /* What the rows of a tick leave to the next one. */
@@ -62,7 +63,7 @@ typedef struct hapi_contact_memory {
 typedef struct hapi_body_contacts {
   hapi_patches *patches;           /* NULL: none yet */
   hapi_contact_memory *memory;     /* of its contacts; capacity.contacts */
-  hapi_contact_memory *old_memory; /* scratch: of those that have ended */
+  hapi_contact_memory *old_memory; /* scratch: of those that are not in their places */
   uint64_t contents;               /* of the patches */
   uint32_t memory_count;
   uint32_t *buckets;     /* of the matching; bucket_count */
@@ -75,7 +76,8 @@ typedef struct hapi_body_contacts {
 } hapi_body_contacts;
 
 /* The set stays in use, and must stay as it is, until the next call. The one before is not looked
- * at. */
-void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches);
+ * at. rows: of the last tick; their sources go with the contacts. */
+void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patches,
+                              const hapi_rows *rows);
 
 #endif

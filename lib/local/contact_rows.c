@@ -375,6 +375,7 @@ void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bo
 /* m, more than the gap of a contact without rows is off by: a touch that slides has a slope of 0.2
  * at most, over the way of both bodies against each other. */
 #define APART_SLACK 2e-4
+#define APART_WAY 5e-4 /* m: half of the slack at that slope; of what turns, a thousandth of it */
 
 static double reach_of(const hapi_local_body *body, const double point[3])
 {
@@ -465,14 +466,20 @@ static bool is_flat(const hapi_patch_contact *in)
 }
 
 /* m: how far the bodies may go against each other. What is fixed on a body may slide over a face of
- * the static world as far as it likes, as nothing of its rows changes. */
-static double contact_way(const placed_contact *c)
+ * the static world as far as it likes, as nothing of its rows changes. Without rows there is only
+ * the gap: of faces and edges it has no second derivative, and a slope is within the slack. */
+static double contact_way(const placed_contact *c, uint8_t what)
 {
   double way_a = c->a != NULL ? c->a->stay.most_way : HUGE_VAL;
   double way_b = c->b != NULL ? c->b->stay.most_way : HUGE_VAL;
   double way = hapi_min(way_a, way_b);
   bool on_static = (c->b == NULL && c->in->touch == HAPI_TOUCH_FACE_B) ||
                    (c->a == NULL && c->in->touch == HAPI_TOUCH_FACE_A);
+  bool curved =
+      c->in->ball_a > 0.0 || c->in->ball_b > 0.0 || c->in->rim_a > 0.0 || c->in->rim_b > 0.0;
+  if (what == HAPI_KEPT_APART && !curved && way >= HAPI_STAY_WAY) {
+    return APART_WAY;
+  }
   if (!is_flat(c->in)) {
     return hapi_min(HAPI_STAY_WAY, way);
   }
@@ -494,7 +501,8 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
   }
   out->what = what;
   hapi_v3_copy(stays.apart, out->apart);
-  out->way2 = contact_way(c) * contact_way(c);
+  double way = contact_way(c, what);
+  out->way2 = way * way;
   out->body_a = c->in->body_a;
   out->body_b = c->in->body_b;
   if (what == HAPI_KEPT_APART) {

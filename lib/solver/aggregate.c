@@ -16,6 +16,8 @@
  * than bodies can tell apart, and steps lead to other shares than sweeps: 30 bricks were 15 % off,
  * and 3 % without steps. */
 #define WIDTH_MOST 4u
+#define WIDE_PLANS \
+  16u /* that are left out after one that came out too wide, while as many units are */
 #define NONE UINT16_MAX
 
 /* ---- plan ---- */
@@ -182,6 +184,11 @@ void hapi_aggregate_plan(hapi_packs *packs)
   uint16_t order[HAPI_AGGREGATE_SLOTS];
   uint32_t bodies = packs->known.body_count;
   out->count = out->neighbour_count = 0;
+  if (out->wide.plans > 0 && 10 * packs->unit_count >= 9 * out->wide.units) {
+    --out->wide.plans;
+    return;
+  }
+  out->wide = (hapi_aggregate_wide){0};
   if (packs->count * HAPI_LANES > HAPI_AGGREGATE_SLOTS || bodies > HAPI_AGGREGATE_BODIES) {
     return;
   }
@@ -191,6 +198,7 @@ void hapi_aggregate_plan(hapi_packs *packs)
   units_sort(&units, number, order);
   if (!neighbours_find(out, &units, &of, order) ||
       !rows_place(out, units.count, packs->contact_count)) {
+    out->wide = (hapi_aggregate_wide){WIDE_PLANS, packs->unit_count};
     return;
   }
   for (uint16_t i = 0; i < units.count; ++i) {

@@ -37,8 +37,15 @@ typedef struct hapi_aggregate_neighbours {
   uint8_t side_before;
 } hapi_aggregate_neighbours;
 
+/* The last plan was too large or too wide, as that of a pile; it takes as long as to make packs. */
+typedef struct hapi_aggregate_wide {
+  uint32_t plans; /* so many more are left out */
+  uint32_t units; /* that it was for */
+} hapi_aggregate_wide;
+
 /* Rows in the order of elimination: of pairs that are near each other. */
 typedef struct hapi_aggregate {
+  hapi_aggregate_wide wide;
   uint32_t count; /* 0: no steps */
   uint32_t neighbour_count;
   uint32_t cost;                        /* of a step, in row updates */

@@ -39,8 +39,6 @@
 #define LEAVE 16.0
 #define LEAVE_SWEEPS 3u
 #define SPREAD_HEIGHT 8u /* levels: a higher stack is solved at once, one by one (packs.c) */
-/* So is what has more rows: a row of 30 light cubes was 0.8 % off, and 0.5 % solved at once. */
-#define SPREAD_ROWS 300u
 
 /* ---- preparation ---- */
 
@@ -786,7 +784,7 @@ void hapi_solver_run(hapi_solver *solver)
     return;
   }
   solver->packs.in_use = hapi_packs_begin(&solver->packs, solver->rows, rows, solver->body_count);
-  if (solver->packs.height > SPREAD_HEIGHT || rows > SPREAD_ROWS) {
+  if (solver->packs.height > SPREAD_HEIGHT) {
     solver->enough = 0;
   }
   if (solver->owes) {

@@ -118,7 +118,7 @@ void hapi_tick_adopt_patches(hapi_tick *tick, hapi_patches *patches)
 {
   HAPI_ASSERT(patches->contact_count <= tick->capacity.contacts);
   HAPI_ASSERT(patches->tool_count <= tick->capacity.tool_points);
-  hapi_body_contacts_adopt(&tick->contacts, patches);
+  hapi_body_contacts_adopt(&tick->contacts, patches, &tick->rows);
   if (tick->facts.model == HAP_MODEL_CONTACT) {
     hapi_tool_adopt_patches(&tick->touches, &tick->pointers, &tick->bodies, patches,
                             tick->facts.wishes);
