@@ -27,9 +27,9 @@
 
 /* The tick of model CONTACT, which carries the contacts between the bodies itself: cubes that touch
  * each other, at rest and pushed. A session runs in lockstep. A tick's time is that of a loop with
- * its own thread: messages, device and report are part of it, a hash is not. After each of them plain
- * ODE finds the contacts of the same scene in the same state and steps it with 10 iterations. Times
- * are medians over the ticks. */
+ * its own thread: messages, device and report are part of it, a hash is not. After each of them,
+ * plain ODE finds the contacts of the same scene in the same state and steps it with 10 iterations.
+ * Times are medians over the ticks. */
 
 #define CONTACT_WARM_TICKS 300
 #define PASSES 401

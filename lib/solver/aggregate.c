@@ -175,22 +175,16 @@ static bool rows_place(hapi_aggregate *out, uint32_t rows, uint32_t contacts)
   return at <= HAPI_AGGREGATE_MATRIX && at <= (WIDTH_MOST + 1) * rows;
 }
 
-void hapi_aggregate_plan(hapi_packs *packs)
+/* False: too large or too wide. */
+static bool plan_make(const hapi_packs *packs, hapi_aggregate *out)
 {
-  hapi_aggregate *out = packs->aggregate;
   unit_bodies units;
   body_units of;
   uint16_t number[HAPI_AGGREGATE_BODIES];
   uint16_t order[HAPI_AGGREGATE_SLOTS];
   uint32_t bodies = packs->known.body_count;
-  out->count = out->neighbour_count = 0;
-  if (out->wide.plans > 0 && 10 * packs->unit_count >= 9 * out->wide.units) {
-    --out->wide.plans;
-    return;
-  }
-  out->wide = (hapi_aggregate_wide){0};
   if (packs->count * HAPI_LANES > HAPI_AGGREGATE_SLOTS || bodies > HAPI_AGGREGATE_BODIES) {
-    return;
+    return false;
   }
   units_list(packs, &units);
   units_link(&units, bodies, &of);
@@ -198,13 +192,26 @@ void hapi_aggregate_plan(hapi_packs *packs)
   units_sort(&units, number, order);
   if (!neighbours_find(out, &units, &of, order) ||
       !rows_place(out, units.count, packs->contact_count)) {
-    out->wide = (hapi_aggregate_wide){WIDE_PLANS, packs->unit_count};
-    return;
+    return false;
   }
   for (uint16_t i = 0; i < units.count; ++i) {
     out->slot[i] = units.slot[order[i]];
   }
   out->count = units.count;
+  return true;
+}
+
+void hapi_aggregate_plan(hapi_packs *packs)
+{
+  hapi_aggregate *out = packs->aggregate;
+  hapi_aggregate_wide *wide = &out->wide;
+  out->count = out->neighbour_count = 0;
+  if (wide->plans > 0 && 10 * packs->unit_count >= 9 * wide->units) {
+    --wide->plans;
+    return;
+  }
+  bool made = plan_make(packs, out);
+  *wide = made ? (hapi_aggregate_wide){0} : (hapi_aggregate_wide){WIDE_PLANS, packs->unit_count};
 }
 
 /* ---- step ---- */

@@ -40,7 +40,7 @@ typedef struct hapi_aggregate_neighbours {
 /* The last plan was too large or too wide, as that of a pile; it takes as long as to make packs. */
 typedef struct hapi_aggregate_wide {
   uint32_t plans; /* so many more are left out */
-  uint32_t units; /* that it was for */
+  uint32_t units; /* that it was for; 0: the last plan is in use, or none was made yet */
 } hapi_aggregate_wide;
 
 /* Rows in the order of elimination: of pairs that are near each other. */

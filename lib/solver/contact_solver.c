@@ -39,6 +39,9 @@
 #define LEAVE 16.0
 #define LEAVE_SWEEPS 3u
 #define SPREAD_HEIGHT 8u /* levels: a higher stack is solved at once, one by one (packs.c) */
+/* So is what has more rows and no step for all pairs: in a pile that is pushed the next runs had
+ * more to do than was left to them, and a tick took a third longer. */
+#define SPREAD_ROWS 300u
 
 /* ---- preparation ---- */
 
@@ -729,6 +732,14 @@ static uint32_t pairs_solve(hapi_solver *solver, uint64_t left)
   return all->cost;
 }
 
+/* Whether a run may leave something to the next one. */
+static bool may_spread(const hapi_solver *solver)
+{
+  const hapi_packs *packs = &solver->packs;
+  bool steps = packs->aggregate != NULL && packs->aggregate->wide.units == 0;
+  return packs->height <= SPREAD_HEIGHT && (solver->row_count <= SPREAD_ROWS || steps);
+}
+
 /* Whether what is due is little enough for the next run. tried: direct solves lead to nothing
  * better now. */
 static bool may_leave(const hapi_solver *solver, bool tried)
@@ -784,7 +795,7 @@ void hapi_solver_run(hapi_solver *solver)
     return;
   }
   solver->packs.in_use = hapi_packs_begin(&solver->packs, solver->rows, rows, solver->body_count);
-  if (solver->packs.height > SPREAD_HEIGHT) {
+  if (!may_spread(solver)) {
     solver->enough = 0;
   }
   if (solver->owes) {
