@@ -286,6 +286,27 @@ TEST(bodies_that_touch_many_others_take_no_steps)
   CHECK(one.solver.packs.aggregate->count == BODIES - 2);
 }
 
+/* Nor is the plan made anew in each tick. One of fewer pairs is. */
+TEST(a_plan_that_came_out_too_wide_is_left_out_for_a_while)
+{
+  hapi_packs *packs = &one.solver.packs;
+  square_make(&one);
+  packs_begin();
+  const hapi_aggregate_wide wide = one.aggregate.wide;
+  CHECK(wide.units == packs->unit_count && wide.plans > 0);
+  for (uint32_t i = wide.plans; i > 0; --i) {
+    hapi_aggregate_plan(packs);
+    CHECK(one.aggregate.wide.plans == i - 1 && one.aggregate.count == 0);
+  }
+  hapi_aggregate_plan(packs);
+  CHECK(one.aggregate.wide.plans == wide.plans);
+  row_make(&one, hapi_pack_work_best(), true);
+  one.aggregate.wide = wide;
+  packs_begin();
+  CHECK(packs->unit_count < wide.units);
+  CHECK(one.aggregate.count == BODIES - 2 && one.aggregate.wide.units == 0);
+}
+
 /* A tick whose budget is nearly spent makes none. */
 TEST(a_step_is_within_the_budget)
 {

@@ -136,14 +136,16 @@ TEST(rows_go_with_contacts_that_come_later)
 /* The nearest old one is still there, farther back: its impulses stay its own. */
 TEST(a_new_contact_takes_impulses_of_ended_ones_alone)
 {
-  const told_contact renewed[] = {{2, 21, 0.001}, {2, 12, 0.0}, {2, 13, 0.1}};
+  const told_contact renewed[] = {{2, 21, 0.001}, {2, 23, 0.5}, {2, 12, 0.0}, {2, 13, 0.1}};
   const told_contact moved[] = {{2, 22, 0.101}, {2, 12, 0.0}};
   things *t = things_new();
   message_adopt(t, four, 4, 0.0);
   rows_leave(t);
-  message_adopt(t, renewed, 3, 0.0);
-  CHECK(t->contacts.memory[0].impulse[0] == 0.0);
-  CHECK(t->contacts.memory[1].impulse[0] == 12.0 && t->contacts.memory[2].impulse[0] == 13.0);
+  t->contacts.adopted = false;
+  message_adopt(t, renewed, 4, 0.0);
+  CHECK(t->contacts.adopted); /* as many as before, but others */
+  CHECK(t->contacts.memory[0].impulse[0] == 0.0 && t->contacts.memory[1].impulse[0] == 0.0);
+  CHECK(t->contacts.memory[2].impulse[0] == 12.0 && t->contacts.memory[3].impulse[0] == 13.0);
   rows_leave(t);
   message_adopt(t, moved, 2, 0.0); /* 13 has ended near the new one */
   CHECK(t->contacts.memory[0].impulse[0] == 13.0 && t->contacts.memory[1].impulse[0] == 12.0);
