@@ -211,7 +211,8 @@ void hapi_aggregate_plan(hapi_packs *packs)
     return;
   }
   bool made = plan_make(packs, out);
-  *wide = made ? (hapi_aggregate_wide){0} : (hapi_aggregate_wide){WIDE_PLANS, packs->unit_count};
+  wide->plans = made ? 0 : WIDE_PLANS;
+  wide->units = made ? 0 : packs->unit_count;
 }
 
 /* ---- step ---- */
