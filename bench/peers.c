@@ -358,6 +358,8 @@ static void error_text(double error, char *out, size_t size)
  * of larger piles stand, and their force is that of the hand's spring. */
 static void force_check(bench *b, const peers_row *r, const char *name)
 {
+  /* A force that is no number, or none at all, has no error that could be too large. */
+  bench_check(b, peers_run_error(&r->run, &r->run) == 0.0, "%s: a force that is a number", name);
   bool slips = strcmp(r->of.world, "pile") == 0 && r->of.bodies < STANDING_PILE;
   bool stands = strcmp(r->of.world, "pile") == 0 && !slips;
   double error = slips ? r->error_own : r->error_ode;

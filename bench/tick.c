@@ -34,8 +34,11 @@
 #define CONTACT_WARM_TICKS 300
 #define PASSES 401
 #define BARE_ITERATIONS 10
-#define BARE_SHARE 0.75    /* of ten bodies, of plain ODE's time */
-#define LARGE_NS 200000.0  /* 64 bodies and about 700 contacts */
+#define BARE_SHARE 0.75   /* of ten bodies, of plain ODE's time */
+#define LARGE_NS 200000.0 /* 64 bodies and about 700 contacts */
+#define PILE_REST_NS 10000.0
+#define PILE_PUSHED_NS 60000.0 /* asked for; 85 to 90 us on AMD EPYC, November 2026 */
+#define ROW_PUSHED_NS 13000.0
 #define MIDDLE_NS 100000.0 /* 64 bodies and 400 contacts */
 #define JOINED 37 /* of 64 in a row: 4 contacts each with the floor, 36 times 4 between them */
 #define JOINED_PUSHED 30 /* as many on the way: gaps close before the hand */
@@ -63,7 +66,7 @@ typedef struct tick_case {
   int count;
   int block[3]; /* cubes along x, y, z that touch; 0: as the scene builds them */
   bool push;
-  double bound_ns; /* 0: none, or that of ten bodies */
+  double bound_ns; /* 0: none */
   int hands;       /* 0: one */
   double tool[3];  /* m, edges of a box that is the pointer; 0: a sphere */
   double friction; /* of the pointer; 0: the scene's */
@@ -77,9 +80,9 @@ static const tick_case cases[] = {
     {"stack", "stack", 0, {0, 0, 0}, false, 0.0},
     {"stack", "stack", 0, {0, 0, 0}, true, 0.0},
     {"row10", "row10", 10, {0, 0, 0}, false, 0.0},
-    {"row10", "row10", 10, {0, 0, 0}, true, 0.0},
-    {"pile64", "pile", 64, {0, 0, 0}, false, LARGE_NS},
-    {"pile64", "pile", 64, {0, 0, 0}, true, LARGE_NS},
+    {"row10", "row10", 10, {0, 0, 0}, true, ROW_PUSHED_NS},
+    {"pile64", "pile", 64, {0, 0, 0}, false, PILE_REST_NS},
+    {"pile64", "pile", 64, {0, 0, 0}, true, PILE_PUSHED_NS},
     {"row64", "row10", 64, {0, 0, 0}, false, 0.0},
     {"row64", "row10", 64, {0, 0, 0}, true, 0.0},
     {"row400", "row10", 64, {64, 1, 1}, false, MIDDLE_NS, .joined = JOINED},
@@ -290,7 +293,8 @@ static void contact_report(bench *b, const tick_bed *t)
                 name, phase, 1e-3 * ns, 1e-3 * ode_ns, ns / ode_ns, BARE_SHARE);
     bench_check(b, t->pass_ns <= PASS_NS, "contact, %s %s: a contact pass %.1f us (bound %.0f)",
                 name, phase, 1e-3 * t->pass_ns, 1e-3 * PASS_NS);
-  } else if (t->what->bound_ns > 0.0) {
+  }
+  if (t->what->bound_ns > 0.0) {
     bench_check(b, ns <= t->what->bound_ns,
                 "contact, %s %s: %g contacts, tick %.1f us (bound %.0f)", name, phase, contacts,
                 1e-3 * ns, 1e-3 * t->what->bound_ns);
@@ -341,7 +345,7 @@ static hap_status bench_tick_contact(bench *b, FILE *csv)
 static const uint32_t loop_sizes[] = {1, 8, 64, NEIGHBOURS_MAX};
 #define SIZE_COUNT BENCH_COUNT(loop_sizes)
 
-#define MANY_NS 30000.0 /* NEIGHBOURS_MAX at once, models that move bodies */
+#define MANY_NS 20000.0 /* NEIGHBOURS_MAX at once, models that move bodies; asked for */
 
 static const hap_model loop_models[] = {HAP_MODEL_SINGLE, HAP_MODEL_IMPULSE, HAP_MODEL_ACCELERANCE,
                                         HAP_MODEL_CONTACT};
@@ -524,7 +528,7 @@ static void loop_report(bench *b, hap_model model, uint32_t count, double ns)
   bool moves = model == HAP_MODEL_ACCELERANCE || model == HAP_MODEL_CONTACT;
   if (count == NEIGHBOURS_MAX && moves) {
     bench_check(b, ns <= MANY_NS, text, name, count, count, ns, ns / count,
-                " (bound 30 us a tick)");
+                " (bound 20 us a tick)");
   } else if ((count == 8 || count == 64) && model != HAP_MODEL_CONTACT) {
     bench_check(b, ns / count <= BOUND_NS, text, name, count, count, ns, ns / count, " (bound 60)");
   } else {

@@ -542,6 +542,16 @@ static bool still_apart(const hapi_contact_kept *kept, const contact_stays *stay
   return gap > OPEN_FLOOR + OPEN_TICKS * period * speed;
 }
 
+/* Whether the gap that is kept of a contact without rows is no wider than the one that it has. */
+static bool gap_is_no_wider(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
+                            uint32_t index, const contact_stays *stays)
+{
+  const hapi_contact_kept *kept = &contacts->memory[index].kept;
+  placed_contact c;
+  return !find_contact(contacts, bodies, index, &c) || !contact_place(&c) ||
+         kept->gap + normal_grown(kept, stays) <= c.gap;
+}
+
 static bool impulses_finite(const hapi_contact_memory *memory)
 {
   double sum = memory->impulse[0] + memory->impulse[1] + memory->impulse[2];
@@ -647,6 +657,7 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
     return true;
   }
   if (kept->what == HAPI_KEPT_APART) {
+    HAPI_ASSERT(gap_is_no_wider(contacts, bodies, index, &stays));
     return still_apart(kept, &stays, facts->period);
   }
   if (!rows_stand(rows, kept, index) || !impulses_finite(memory)) {

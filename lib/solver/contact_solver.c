@@ -736,7 +736,7 @@ static uint32_t pairs_solve(hapi_solver *solver, uint64_t left)
 static bool may_spread(const hapi_solver *solver)
 {
   const hapi_packs *packs = &solver->packs;
-  bool steps = packs->aggregate != NULL && packs->aggregate->wide.units == 0;
+  bool steps = packs->in_use && packs->aggregate != NULL && packs->aggregate->wide.units == 0;
   return packs->height <= SPREAD_HEIGHT && (solver->row_count <= SPREAD_ROWS || steps);
 }
 
