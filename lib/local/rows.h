@@ -44,6 +44,12 @@ typedef struct hapi_row_lifted {
   uint32_t which; /* index into packables; HAPI_NO_PACKABLE: it is not packable */
 } hapi_row_lifted;
 
+/* Of a row, in the solve that did not come last in a tick of two. */
+typedef struct hapi_row_aside {
+  hapi_row_source source;
+  double impulse;
+} hapi_row_aside;
+
 typedef struct hapi_rows {
   hapi_solver solver;
   hapi_work work;
@@ -53,7 +59,10 @@ typedef struct hapi_rows {
   uint32_t contact_begin;  /* the first row of contacts between bodies */
   hapi_row_lifted *lifted; /* in this tick; capacity */
   uint32_t lifted_count;
-  double drift; /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
+  hapi_row_aside *aside; /* see push_out.h; capacity */
+  uint32_t aside_count;  /* 0: the last tick had one solve */
+  bool swapped;          /* since it began to push out: each solve goes on from its own impulses */
+  double drift;          /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
   double hand;  /* J s^2, the least F^2 / (k^2 a) of the tick's springs to hands, with F of the tick
                    before; HUGE_VAL: none */
   bool touched; /* by a pointer that has been in reach since */

@@ -502,8 +502,7 @@ static void packs_know(hapi_packs *packs)
   packs->known.news = 0;
 }
 
-/* To the rows that are where they were; others may have been written over them. */
-static void packs_give_back(hapi_packs *packs, hapi_row *rows)
+void hapi_packs_give_back(hapi_packs *packs, hapi_row *rows)
 {
   for (uint32_t i = 0; packs->ahead && i < packs->packable_count; ++i) {
     const hapi_packable *packable = &packs->packables[i];
@@ -521,7 +520,7 @@ bool hapi_packs_begin(hapi_packs *packs, hapi_row *rows, uint32_t row_count, uin
     packs_know(packs);
     return true;
   }
-  packs_give_back(packs, rows);
+  hapi_packs_give_back(packs, rows);
   if (packs->work == NULL || body_count > packs->body_capacity || row_count < 3 * PACKABLE_LEAST) {
     packs->count = packs->height = 0;
     return false;

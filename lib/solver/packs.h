@@ -191,6 +191,9 @@ void hapi_packs_store(hapi_packs *packs, hapi_row *rows);
 void hapi_packs_load(const hapi_packs *packs, const hapi_row *rows);
 /* A run ends: the impulses stay in the packs, and the rows are not to be asked for them. */
 void hapi_packs_end(hapi_packs *packs, hapi_row *rows);
+/* Between two runs: the impulses that are ahead come to the rows that are where they were. Others
+ * may have been written over them, and have their own. */
+void hapi_packs_give_back(hapi_packs *packs, hapi_row *rows);
 /* Nothing is known of any rows. */
 void hapi_packs_forget(hapi_packs *packs);
 

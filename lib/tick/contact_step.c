@@ -17,6 +17,7 @@
 #include "local/gyro.h"
 #include "local/pointer_forces.h"
 #include "local/pointer_rows.h"
+#include "local/push_out.h"
 #include "local/still_islands.h"
 #include "local/tool_place.h"
 #include "pointer/proxy.h"
@@ -408,48 +409,6 @@ static void rows_account(const hapi_rows *rows, hapi_bodies *bodies, hapi_body_c
   }
 }
 
-static bool any_pushes_out(const hapi_rows *rows)
-{
-  for (uint32_t i = 0; i < rows->contact_begin; ++i) {
-    if (rows->sources[i].pushes_out &&
-        (rows->sources[i].joint || rows->solver.rows[i].impulse > 0.0)) {
-      return true;
-    }
-  }
-  for (uint32_t i = 0; i < rows->lifted_count; ++i) {
-    const hapi_row_lifted *at = &rows->lifted[i];
-    const hapi_row *row = &rows->solver.rows[at->row];
-    if (hapi_packs_impulses(&rows->solver.packs, at->which, row).of[0] > 0.0) {
-      return true;
-    }
-  }
-  return false;
-}
-
-/* Push-out and the closing of joints move the bodies, and are not to stay in their velocities:
- * poses first, then a second solve without them. True: it has to be made. */
-static bool rows_stop_push_out(hapi_rows *rows)
-{
-  hapi_solver *solver = &rows->solver;
-  /* rows of pointers that are no proxies do not push out */
-  if (solver->apart || !any_pushes_out(rows)) {
-    return false;
-  }
-  for (uint32_t i = 0; i < rows->contact_begin; ++i) {
-    if (rows->sources[i].pushes_out) {
-      hapi_row_retarget(&solver->rows[i], rows->sources[i].stays);
-    }
-  }
-  for (uint32_t i = 0; i < rows->lifted_count; ++i) {
-    const hapi_row_lifted *at = &rows->lifted[i];
-    hapi_row_retarget(&solver->rows[at->row], rows->sources[at->row].stays);
-    if (at->which != HAPI_NO_PACKABLE) {
-      hapi_packs_add_news(&solver->packs, (hapi_pack_news){at->which, at->row, false});
-    }
-  }
-  return true;
-}
-
 /* The solver's time by the rows that each effect has in it. */
 static __attribute__((noinline, cold)) void share_out(const hapi_rows *rows, uint64_t cycles,
                                                       hapi_effect_sample *sample)
@@ -664,8 +623,9 @@ void hapi_contact_step(hapi_tick *tick)
   }
   rows_make(tick);
   rows_set_coarse(&tick->rows, tick->touches.count > 0);
+  hapi_push_out_begin(&tick->rows);
   rows_solve(&tick->rows, &tick->sample);
-  bool again = rows_stop_push_out(&tick->rows);
+  bool again = hapi_push_out_acts(&tick->rows);
   bodies_step(&tick->bodies, &tick->rows, &tick->facts, &tick->sample);
   if (tick->bodies.unsound) {
     hapi_tick_fault(tick, HAP_FAULT_LOCAL_STATE, 0);
@@ -677,6 +637,7 @@ void hapi_contact_step(hapi_tick *tick)
         hapi_rigid_push_out(p, period, solver->v[p->proxy.row], solver->free[p->proxy.row]);
       }
     }
+    hapi_push_out_stop(&tick->rows);
     rows_solve(&tick->rows, &tick->sample);
     bodies_take_velocities(&tick->bodies, &tick->rows, tick->facts.wishes);
   }

@@ -60,6 +60,7 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(joints.memory, c->joints),
       ARRAY(rows.sources, tick->rows.capacity),
       ARRAY(rows.lifted, tick->rows.capacity),
+      ARRAY(rows.aside, tick->rows.capacity),
       ARRAY(rows.solver.rows, tick->rows.capacity),
       ARRAY(rows.solver.v, places),
       ARRAY(rows.solver.free, places),
@@ -121,6 +122,7 @@ void hapi_tick_reset(hapi_tick *tick)
   tick->rows.unsolved = tick->rows.unsolved_most = 0;
   tick->rows.unsolved_all = 0;
   tick->rows.work = (hapi_work){.most = 0};
+  tick->rows.aside_count = 0;
   solver->row_count = solver->body_count = 0;
   hapi_packs_forget(&solver->packs);
   solver->rest = (hapi_direct_rest){0};

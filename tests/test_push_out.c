@@ -1,0 +1,142 @@
+/* SPDX-FileCopyrightText: hapode contributors
+ * SPDX-License-Identifier: MIT */
+
+/* Ticks in which something is pushed out of something else have two solves, and each may go on from
+ * its own impulses of the tick before. */
+
+#include "tests/tap.h"
+
+#include <string.h>
+
+#include "local/push_out.h"
+
+#define ROWS 3
+
+typedef struct rows_rig {
+  hapi_rows rows;
+  hapi_row of[ROWS];
+  hapi_row_source sources[ROWS];
+  hapi_row_lifted lifted[ROWS];
+  hapi_row_aside aside[ROWS];
+  double v[2][6];
+  double free[2][6];
+} rows_rig;
+
+/* Along x, y and z, on 1 kg that falls. */
+static void rows_make(rows_rig *r)
+{
+  memset(r, 0, sizeof *r);
+  hapi_solver *solver = &r->rows.solver;
+  r->rows.sources = r->sources;
+  r->rows.lifted = r->lifted;
+  r->rows.aside = r->aside;
+  r->rows.capacity = ROWS;
+  r->rows.contact_begin = ROWS;
+  solver->rows = r->of;
+  solver->v = r->v;
+  solver->free = r->free;
+  solver->row_count = ROWS;
+  solver->body_count = 2;
+  r->free[1][2] = -1.0;
+  for (uint32_t i = 0; i < ROWS; ++i) {
+    r->of[i].a = 1;
+    r->of[i].single = 1;
+    r->of[i].inverse = 1.0;
+    r->of[i].ja[i] = r->of[i].ba[i] = 1.0;
+    r->sources[i] = (hapi_row_source){.contact = 10 + i, .joint = true, .pushes_out = i == 0};
+  }
+}
+
+/* What a solve has found. */
+static void solve_ends(rows_rig *r, double x, double y, double z, uint64_t updates)
+{
+  r->of[0].impulse = x;
+  r->of[1].impulse = y;
+  r->of[2].impulse = z;
+  r->rows.solver.updates = updates;
+}
+
+static void rows_hold(const rows_rig *r, double x, double y, double z)
+{
+  CHECK_NEAR(r->of[0].impulse, x, 0.0);
+  CHECK_NEAR(r->of[1].impulse, y, 0.0);
+  CHECK_NEAR(r->of[2].impulse, z, 0.0);
+}
+
+/* A tick with two solves. */
+static void tick_of_two(rows_rig *r, uint64_t updates)
+{
+  hapi_push_out_begin(&r->rows);
+  solve_ends(r, 5.0, 6.0, 7.0, 10);
+  CHECK(hapi_push_out_acts(&r->rows));
+  hapi_push_out_stop(&r->rows);
+  solve_ends(r, 1.0, 2.0, 3.0, updates);
+}
+
+TEST(each_solve_goes_on_from_its_own_impulses)
+{
+  rows_rig r;
+  rows_make(&r);
+  tick_of_two(&r, 3000);
+  hapi_push_out_begin(&r.rows);
+  rows_hold(&r, 5.0, 6.0, 7.0);
+  CHECK_NEAR(r.v[1][0], 5.0, 0.0);
+  CHECK_NEAR(r.v[1][2], -1.0 + 7.0, 0.0);
+  solve_ends(&r, 50.0, 60.0, 70.0, 10);
+  CHECK(hapi_push_out_acts(&r.rows));
+  hapi_push_out_stop(&r.rows);
+  rows_hold(&r, 1.0, 2.0, 3.0);
+  CHECK_NEAR(r.v[1][0], 1.0, 0.0);
+  CHECK_NEAR(r.v[1][2], -1.0 + 3.0, 0.0);
+  solve_ends(&r, 1.5, 2.5, 3.5, 10); /* it was cheap, and goes on so all the same */
+  hapi_push_out_begin(&r.rows);
+  rows_hold(&r, 50.0, 60.0, 70.0);
+}
+
+TEST(where_that_is_cheap_they_go_on_from_each_other)
+{
+  rows_rig r;
+  rows_make(&r);
+  tick_of_two(&r, 100);
+  hapi_push_out_begin(&r.rows);
+  rows_hold(&r, 1.0, 2.0, 3.0);
+  solve_ends(&r, 5.0, 6.0, 7.0, 10);
+  hapi_push_out_stop(&r.rows);
+  rows_hold(&r, 5.0, 6.0, 7.0);
+}
+
+TEST(another_row_in_its_place_keeps_its_own_impulse)
+{
+  rows_rig r;
+  rows_make(&r);
+  tick_of_two(&r, 3000);
+  r.sources[0].contact = 20;
+  r.sources[1].part = 1;
+  hapi_push_out_begin(&r.rows);
+  rows_hold(&r, 1.0, 2.0, 7.0);
+}
+
+TEST(a_row_that_is_left_out_gets_no_impulse)
+{
+  rows_rig r;
+  rows_make(&r);
+  tick_of_two(&r, 3000);
+  r.of[1].inverse = 0.0;
+  r.of[1].impulse = 0.0;
+  hapi_push_out_begin(&r.rows);
+  rows_hold(&r, 5.0, 0.0, 7.0);
+}
+
+TEST(what_has_pushed_out_is_forgotten_when_nothing_does)
+{
+  rows_rig r;
+  rows_make(&r);
+  tick_of_two(&r, 3000);
+  r.sources[0].pushes_out = false;
+  hapi_push_out_begin(&r.rows);
+  CHECK(!hapi_push_out_acts(&r.rows));
+  solve_ends(&r, 1.0, 2.0, 3.0, 3000);
+  r.sources[0].pushes_out = true;
+  hapi_push_out_begin(&r.rows);
+  rows_hold(&r, 1.0, 2.0, 3.0);
+}
