@@ -751,6 +751,7 @@ TEST(what_may_stay_undone_saves_work_and_comes_to_rest)
     make_tower(8, 0.5);
     s.solver.tolerance = 1e-9;
     s.solver.coarse.energy2 = run == 0 ? 0.0 : 1e-10;
+    s.solver.coarse.largest = HAPI_COARSE;
     s.solver.update_budget = 100 * s.row_count;
     for (int tick = 0; tick < HELD; ++tick) {
       load_slowly(0, tick < 300 ? tick : 300);

@@ -298,7 +298,7 @@ static double opening_left(double opening, double *out_updates)
     biped_make(0.2, 0.0);
     velocities_draw(&seed, 0.05);
     hapi_solver solver = solver_of(200000);
-    solver.coarse = (hapi_coarse){.energy2 = 1e-8, .opening = opening};
+    solver.coarse = (hapi_coarse){.energy2 = 1e-8, .largest = HAPI_COARSE, .opening = opening};
     hapi_solver_run(&solver);
     CHECK(solver.residual < HAPI_COARSE);
     worst = fmax(worst, due_most(false));

@@ -20,8 +20,8 @@
  * A way along or across flat faces has no second derivative. It ends where an arm is wrong by a
  * share of the body's size. */
 #define HAPI_STAY_WAY 3e-5        /* m: of what is curved, and at least */
-#define HAPI_STAY_FLAT_WAY 1e-4   /* m, at most */
-#define HAPI_STAY_FLAT_SHARE 4e-3 /* of the body's radius of gyration */
+#define HAPI_STAY_FLAT_WAY 2e-4   /* m, at most */
+#define HAPI_STAY_FLAT_SHARE 8e-3 /* of the body's radius of gyration */
 #define HAPI_STAY_TURN 3e-4       /* at most */
 #define HAPI_STAY_BEND 1e-9       /* m, of arms as long as the body is large */
 #define HAPI_STAY_SPEED 1e-5      /* m/s, sum of the components' sizes: less is slow */

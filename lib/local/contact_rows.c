@@ -26,6 +26,9 @@
   1e-3 /* m: a contact that is more open than this and than what the bodies'
                                motion closes in a few ticks has no rows */
 #define OPEN_TICKS 3.0
+#define LEAVE_FLOOR \
+  2e-3 /* m: one that has rows keeps them so far, or all behind them would change
+                               their places with each contact that opens and closes */
 
 typedef struct placed_contact {
   uint32_t index;
@@ -302,13 +305,13 @@ static double point_speed(const hapi_local_body *body, const double point[3])
   return hapi_v3_norm(velocity);
 }
 
-static bool is_near(const placed_contact *c, double period)
+static bool is_near(const placed_contact *c, double floor, double period)
 {
-  if (c->gap <= OPEN_FLOOR) {
+  if (c->gap <= floor) {
     return true;
   }
   double speed = point_speed(c->a, c->point) + point_speed(c->b, c->point);
-  return c->gap <= OPEN_FLOOR + OPEN_TICKS * period * speed;
+  return c->gap <= floor + OPEN_TICKS * period * speed;
 }
 
 /* m/s along the normal, before the tick; negative: they come nearer. */
@@ -558,14 +561,64 @@ static bool impulses_finite(const hapi_contact_memory *memory)
   return hapi_finite(&sum, 1);
 }
 
-/* Whether the rows of the tick before are where they stood. Rows of this tick so far may have been
- * written over them, also such as were taken back: a stop of a joint that is too far away. Then the
- * first one is among those. */
+/* Where the rows of the tick before are now. */
+static uint32_t rows_place(const hapi_rows *rows, const hapi_contact_kept *kept)
+{
+  return kept->first + rows->before.up;
+}
+
+/* Whether they are still there. Rows of this tick so far may have been written over them, also such
+ * as were taken back: a stop of a joint that is too far away. Then the first one is among those. */
 static bool rows_stand(const hapi_rows *rows, const hapi_contact_kept *kept, uint32_t index)
 {
-  const hapi_row_source *source = &rows->sources[kept->first];
-  return kept->first >= rows->solver.row_count && source->contact == index && !source->joint &&
-         !source->pointer && source->count == kept->count;
+  uint32_t at = rows_place(rows, kept);
+  return at >= rows->solver.row_count && at >= rows->before.from &&
+         at + kept->count <= rows->before.end && rows->sources[at].contact == index &&
+         !rows->sources[at].joint && !rows->sources[at].pointer &&
+         rows->sources[at].count == kept->count;
+}
+
+/* Where the rows of the first contact stand of those from that one on; before->end: none do. What
+ * does not stand will not do so later in the tick, so that each contact is looked at once. */
+static uint32_t next_standing(const hapi_body_contacts *contacts, uint32_t index, hapi_rows *rows)
+{
+  uint32_t i = index > rows->before.next ? index : rows->before.next;
+  while (i < contacts->memory_count && (contacts->memory[i].kept.what != HAPI_KEPT_ROWS ||
+                                        !rows_stand(rows, &contacts->memory[i].kept, i))) {
+    ++i;
+  }
+  rows->before.next = i;
+  return i < contacts->memory_count ? rows_place(rows, &contacts->memory[i].kept)
+                                    : rows->before.end;
+}
+
+/* Where the rows of a contact would be written over those that other contacts go on with, these go
+ * up, or all of them would have to be made anew. Each time by twice as much: where many come, the
+ * next ones find room. */
+static void rows_make_room(const hapi_body_contacts *contacts, uint32_t index, hapi_rows *rows)
+{
+  hapi_rows_before *before = &rows->before;
+  uint32_t first = rows->solver.row_count;
+  if (first >= before->end) {
+    return;
+  }
+  uint32_t from = next_standing(contacts, index + 1, rows);
+  uint32_t count = before->end - from;
+  if (count == 0 || from - first >= HAPI_CONTACT_ROWS) {
+    return;
+  }
+  uint32_t way = before->step - (from - first);
+  if (before->end + way > rows->capacity) {
+    return;
+  }
+  memmove(&rows->solver.rows[from + way], &rows->solver.rows[from],
+          count * sizeof *rows->solver.rows);
+  memmove(&rows->sources[from + way], &rows->sources[from], count * sizeof *rows->sources);
+  before->end += way;
+  before->up += way;
+  before->from = from + way;
+  before->step *= 2;
+  before->moved += count;
 }
 
 /* Whether rows that stand are where they would come next and ask for what they asked for: then they
@@ -573,8 +626,8 @@ static bool rows_stand(const hapi_rows *rows, const hapi_contact_kept *kept, uin
 static bool rows_stay(const hapi_rows *rows, const hapi_contact_kept *kept, double gap,
                       const hapi_tick_facts *facts)
 {
-  return kept->plain && !facts->bounces && kept->first == rows->solver.row_count && gap <= 0.0 &&
-         gap >= kept->least;
+  return kept->plain && !facts->bounces && rows->before.up == 0 &&
+         kept->first == rows->solver.row_count && gap <= 0.0 && gap >= kept->least;
 }
 
 /* What rows_stay stands for. */
@@ -604,15 +657,18 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   hapi_solver *solver = &rows->solver;
   hapi_contact_kept *kept = &memory->kept;
   uint32_t first = solver->row_count;
+  uint32_t at = rows_place(rows, kept);
   uint32_t count = kept->count;
   uint8_t parts[3];
-  HAPI_ASSERT(kept->first + count <= rows->capacity);
-  if (c->gap > OPEN_FLOOR || (!kept->all && list_parts(c, memory, parts) != count)) {
+  HAPI_ASSERT(at + count <= rows->capacity);
+  if (c->gap > LEAVE_FLOOR || (!kept->all && list_parts(c, memory, parts) != count)) {
     return false;
   }
-  if (kept->first > first) {
-    memmove(&solver->rows[first], &solver->rows[kept->first], count * sizeof *solver->rows);
-    memmove(&rows->sources[first], &rows->sources[kept->first], count * sizeof *rows->sources);
+  if (at > first) {
+    memmove(&solver->rows[first], &solver->rows[at], count * sizeof *solver->rows);
+    memmove(&rows->sources[first], &rows->sources[at], count * sizeof *rows->sources);
+  }
+  if (kept->first != first) {
     for (uint32_t i = 1; i < count; ++i) {
       hapi_row *row = &solver->rows[first + i];
       row->normal = row->normal < 0 ? -1 : (int32_t)first;
@@ -664,7 +720,8 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
     return false;
   }
   c.surface = &hapi_patches_surfaces(contacts->patches)[kept->surface];
-  c.gap = kept->gap + gap_grown(kept, &rows->solver.rows[kept->first], &stays);
+  uint32_t at = rows_place(rows, kept);
+  c.gap = kept->gap + gap_grown(kept, &rows->solver.rows[at], &stays);
   if (rows_stay(rows, kept, c.gap, facts)) {
     HAPI_ASSERT(rows_ask_alike(rows, &c, kept));
     rows->solver.row_count += kept->count;
@@ -681,12 +738,14 @@ static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies
   hapi_contact_memory *memory = &contacts->memory[index];
   uint32_t first = rows->solver.row_count;
   placed_contact c;
+  bool had = memory->kept.what == HAPI_KEPT_ROWS;
   memory->kept.what = HAPI_KEPT_NOTHING;
   if (!find_contact(contacts, bodies, index, &c)) {
     contact_keep(rows, &c, HAPI_KEPT_IDLE, first, &memory->kept);
-  } else if (first + 3 <= rows->capacity && contact_place(&c)) {
-    bool near = is_near(&c, facts->period);
+  } else if (first + HAPI_CONTACT_ROWS <= rows->capacity && contact_place(&c)) {
+    bool near = is_near(&c, had ? LEAVE_FLOOR : OPEN_FLOOR, facts->period);
     if (near) {
+      rows_make_room(contacts, index, rows);
       add_contact(rows, &c, memory, facts, sample);
     }
     if (c.follows) {
@@ -714,7 +773,7 @@ bool hapi_contact_is_near(const hapi_body_contacts *contacts, const hapi_bodies 
     }
   }
   return find_contact(contacts, bodies, index, &c) && contact_place(&c) &&
-         is_near(&c, facts->period);
+         is_near(&c, OPEN_FLOOR, facts->period);
 }
 
 /* Those of islands that are still have no rows. */
@@ -741,6 +800,7 @@ void hapi_contact_rows(hapi_body_contacts *contacts, const hapi_bodies *bodies, 
   bool all_still = bodies->still > 0 && bodies->still == bodies->live_count && !contacts->adopted;
   contacts->rowed_tick = facts->tick;
   contacts->adopted = false;
+  rows->before.end = goes_on ? rows->before.end : 0;
   if (all_still) {
     return;
   }

@@ -13,6 +13,8 @@
 /* Place 0 of the solver's velocities never moves: the static world. */
 #define HAPI_STATIC_ROW 0u
 
+#define HAPI_CONTACT_ROWS 3u /* of a contact, at most: its normal and two frictions */
+
 /* Where a row of the solver comes from. */
 typedef struct hapi_row_source {
   uint32_t contact; /* of the patches, or of the pointers */
@@ -50,9 +52,20 @@ typedef struct hapi_row_aside {
   double impulse;
 } hapi_row_aside;
 
+/* The rows of the tick before, behind those of this one. */
+typedef struct hapi_rows_before {
+  uint32_t end;   /* beyond the last */
+  uint32_t next;  /* contacts before that one have been reached, or have no rows that stand */
+  uint32_t up;    /* how far those went up in this tick that were not reached yet, */
+  uint32_t from;  /* and where the first of them stands; 0: they stand where they stood */
+  uint32_t step;  /* by which they go up the next time, or a few less */
+  uint32_t moved; /* rows that went up so far, each time that they did */
+} hapi_rows_before;
+
 typedef struct hapi_rows {
   hapi_solver solver;
   hapi_work work;
+  hapi_rows_before before;
   hapi_row_source *sources; /* of the rows; capacity */
   uint32_t capacity;
   uint32_t kept;           /* rows of the tick before that go on in this one */

@@ -682,9 +682,9 @@ static void run_apart(hapi_solver *solver)
 /* Whether what is still due may be left to the next run. */
 static bool is_settled(const hapi_solver *solver)
 {
-  return solver->residual < solver->tolerance ||
-         (solver->residual < HAPI_COARSE && solver->swept.opening <= solver->coarse.opening &&
-          solver->swept.energy2 < solver->coarse.energy2);
+  return solver->residual < solver->tolerance || (solver->residual < solver->coarse.largest &&
+                                                  solver->swept.opening <= solver->coarse.opening &&
+                                                  solver->swept.energy2 < solver->coarse.energy2);
 }
 
 /* Of the corrections from sweep to sweep, by those of the last three: forward and backward ones go
@@ -704,7 +704,7 @@ static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t time
   for (uint32_t i = 0; i < sweeps; ++i) {
     share *= rate;
   }
-  return share * solver->residual < HAPI_COARSE &&
+  return share * solver->residual < solver->coarse.largest &&
          share * solver->swept.opening <= solver->coarse.opening &&
          share * share * solver->swept.energy2 < solver->coarse.energy2;
 }
@@ -744,7 +744,8 @@ static bool may_spread(const hapi_solver *solver)
  * better now. */
 static bool may_leave(const hapi_solver *solver, bool tried)
 {
-  return solver->enough > 0 && solver->coarse.energy2 > 0.0 && solver->residual < HAPI_COARSE &&
+  return solver->enough > 0 && solver->coarse.energy2 > 0.0 &&
+         solver->residual < solver->coarse.largest &&
          (tried || solver->swept.energy2 < LEAVE * solver->coarse.energy2);
 }
 

@@ -47,9 +47,10 @@ typedef struct hapi_direct_last {
   double residual; /* the largest correction due after it, m/s */
 } hapi_direct_last;
 
-/* A run is done also when the corrections of a sweep are small enough: none is HAPI_COARSE, and */
+/* A run is done also when the corrections of a sweep are small enough. */
 typedef struct hapi_coarse {
   double energy2; /* J: their sum of impulse^2 x response is below; 0: never done so */
+  double largest; /* m/s: so are all of them; the next run goes on from its impulses */
   double opening; /* m/s: none of a row without bounds, as of a joint, is above */
 } hapi_coarse;
 
@@ -90,9 +91,7 @@ typedef struct hapi_solver {
 /* m/s: what is left undone and may add energy; below, asking costs too much */
 #define HAPI_UNSOLVED 3e-3
 
-/* m/s: the largest correction that a run may leave undone where `coarse` allows it. The next run
- * goes on from its impulses. */
-#define HAPI_COARSE 1e-4
+#define HAPI_COARSE 1e-4 /* m/s, that a run of few rows may leave undone */
 
 /* Doubles of work for stacks, chains and flat piles: 16 blocks of 6x6 for each body. A dense island
  * of n bodies takes n. */

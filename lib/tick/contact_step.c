@@ -39,6 +39,8 @@
 #define COARSE_MOST 1e-10 /* the most, under a hand */
 #define COARSE_FADE 0.98  /* a tick */
 #define COARSE_LEVELS 4.0 /* of a stack: a higher one leans by the square of its height */
+#define COARSE_ROWS 500.0 /* the largest correction of more rows may be larger by the root, */
+#define COARSE_TIMES 2.0  /* up to so many times */
 
 /* A tick whose solves have taken half as many row updates again as is usual, or what is done within
  * 20 us, leaves the rest to the next ticks, where the rest is little. */
@@ -96,6 +98,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   hapi_solver *solver = &rows->solver;
   memset(solver->v[HAPI_STATIC_ROW], 0, sizeof solver->v[0]);
   solver->body_count = 1;
+  rows->before = (hapi_rows_before){.end = solver->row_count, .step = HAPI_CONTACT_ROWS};
   hapi_solver_clear(solver);
   rows->kept = 0;
   rows->lifted_count = 0;
@@ -436,7 +439,7 @@ static void rows_note_unsolved(hapi_rows *rows)
 /* What the solves of this tick may leave undone: by the springs to hands. It fades where their
  * forces become less, and stays while a hand that touched is in reach, as one that taps. Joints
  * among contacts are closed: errors of both say which contacts slide. */
-static void rows_set_coarse(hapi_rows *rows, bool reaches)
+static void rows_set_coarse(hapi_rows *rows, bool reaches, bool joins)
 {
   bool touches = rows->hand < HUGE_VAL;
   double high = hapi_max((double)rows->solver.packs.height / COARSE_LEVELS, 1.0);
@@ -449,6 +452,8 @@ static void rows_set_coarse(hapi_rows *rows, bool reaches)
   double most = (rows->touched ? COARSE_MOST : COARSE_REST) * (double)rows->solver.body_count;
   most = rows->drift > 0.0 ? most : 0.0;
   rows->solver.coarse.energy2 = rows->touched ? hapi_min(before, most) : most;
+  double times = joins ? 1.0 : sqrt((double)rows->solver.row_count / COARSE_ROWS);
+  rows->solver.coarse.largest = HAPI_COARSE * hapi_clamp(times, 1.0, COARSE_TIMES);
   bool contacts = rows->solver.row_count > rows->contact_begin;
   rows->solver.coarse.opening = contacts ? rows->solver.tolerance : HAPI_COARSE;
 }
@@ -607,7 +612,7 @@ static void rows_make(hapi_tick *tick)
   }
   rows->solver.apart &= rows->solver.row_count == of_pointers;
   HAPI_ASSERT(rows->kept <= rows->solver.row_count);
-  rows->work.done = HAPI_ROW_KEEPING * (uint64_t)rows->kept +
+  rows->work.done = HAPI_ROW_KEEPING * ((uint64_t)rows->kept + rows->before.moved) +
                     HAPI_ROW_MAKING * (uint64_t)(rows->solver.row_count - rows->kept);
 }
 
@@ -622,7 +627,7 @@ void hapi_contact_step(hapi_tick *tick)
     hapi_own_push(&at);
   }
   rows_make(tick);
-  rows_set_coarse(&tick->rows, tick->touches.count > 0);
+  rows_set_coarse(&tick->rows, tick->touches.count > 0, tick->joints.count > 0);
   hapi_push_out_begin(&tick->rows);
   rows_solve(&tick->rows, &tick->sample);
   bool again = hapi_push_out_acts(&tick->rows);
