@@ -3,6 +3,7 @@
 #include "local/push_out.h"
 
 #include "base/assert.h"
+#include "base/vec.h"
 
 /* Row updates of a second solve. With fewer, each solve begins from the impulses of the other one:
  * then too little of a lift is done, and not too much, which takes a body out of its touch. */
@@ -59,7 +60,8 @@ static void impulses_swap(hapi_rows *rows)
     hapi_row *row = &solver->rows[i];
     double impulse = row->impulse;
     bool same = i < rows->aside_count && is_same_source(&aside->source, &rows->sources[i]);
-    row->impulse = same && row->inverse != 0.0 ? aside->impulse : impulse;
+    bool fits = same && row->inverse != 0.0 && hapi_finite(&aside->impulse, 1);
+    row->impulse = fits ? aside->impulse : impulse;
     *aside = (hapi_row_aside){rows->sources[i], impulse};
   }
   rows->aside_count = solver->row_count;
