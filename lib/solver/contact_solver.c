@@ -39,9 +39,10 @@
 #define LEAVE 16.0
 #define LEAVE_SWEEPS 3u
 #define SPREAD_HEIGHT 8u /* levels: a higher stack is solved at once, one by one (packs.c) */
-/* So is what has more rows and no step for all pairs: in a pile that is pushed the next runs had
- * more to do than was left to them, and a tick took a third longer. */
+/* So is what has more rows, is higher and has no step for all pairs: of a wall of eight levels that
+ * is pushed a tick took a sixth longer, as the next runs had more to do. */
 #define SPREAD_ROWS 300u
+#define SPREAD_LOW 5u
 
 /* ---- preparation ---- */
 
@@ -737,7 +738,8 @@ static bool may_spread(const hapi_solver *solver)
 {
   const hapi_packs *packs = &solver->packs;
   bool steps = packs->in_use && packs->aggregate != NULL && packs->aggregate->wide.units == 0;
-  return packs->height <= SPREAD_HEIGHT && (solver->row_count <= SPREAD_ROWS || steps);
+  return packs->height <= SPREAD_HEIGHT &&
+         (solver->row_count <= SPREAD_ROWS || packs->height <= SPREAD_LOW || steps);
 }
 
 /* Whether what is due is little enough for the next run. tried: direct solves lead to nothing

@@ -130,12 +130,14 @@ static void bodies_fill(const hapi_packs *packs, hapi_pack *pack, uint32_t lane,
 
 /* ---- units, colors and their order ---- */
 
-/* To the last bit: of a patch they are, and of what was made at the same time. */
+/* Exactly: of a patch they are, and of what was made at the same time. */
 static bool same_directions(const hapi_row *row, const hapi_row *other)
 {
   bool same = true;
   for (int i = 0; i < 3; ++i) {
-    same = same && memcmp(row[i].ja, other[i].ja, 3 * sizeof row->ja[0]) == 0;
+    const double *j = row[i].ja;
+    const double *k = other[i].ja;
+    same = same && j[0] == k[0] && j[1] == k[1] && j[2] == k[2];
   }
   return same;
 }
@@ -264,15 +266,19 @@ static bool pack_add(hapi_packs *packs, const hapi_row *rows, const uint32_t *un
   pack->first = packs->contact_count;
   pack->block = packs->block_count;
   pack->paired = packs->units[units[0]].paired;
+  uint32_t filled = 0;
   for (uint32_t lane = 0; lane < lanes; ++lane) {
     uint32_t count = packs->units[units[lane]].count;
     pack->count = count > pack->count ? count : pack->count;
+    filled += count;
   }
   if (pack->first + pack->count > packs->contact_capacity) {
     return false;
   }
-  memset(&packs->contacts[pack->first], 0, pack->count * sizeof *packs->contacts);
-  memset(packs->impulse[pack->first], 0, pack->count * sizeof *packs->impulse);
+  if (filled < HAPI_LANES * pack->count) { /* what is empty has zeros */
+    memset(&packs->contacts[pack->first], 0, pack->count * sizeof *packs->contacts);
+    memset(packs->impulse[pack->first], 0, pack->count * sizeof *packs->impulse);
+  }
   for (uint32_t lane = 0; lane < lanes; ++lane) {
     const hapi_pack_unit *unit = &packs->units[units[lane]];
     const hapi_row *row = &rows[packs->packables[unit->first].row];
