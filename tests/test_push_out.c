@@ -152,15 +152,16 @@ TEST(what_has_pushed_out_is_forgotten_when_nothing_does)
   r.sources[0].pushes_out = false;
   hapi_push_out_begin(&r.rows);
   CHECK(!hapi_push_out_acts(&r.rows));
-  solve_ends(&r, 1.0, 2.0, 3.0, 3000);
+  solve_ends(&r, 4.0, 8.0, 9.0, 3000);
   r.sources[0].pushes_out = true;
   hapi_push_out_begin(&r.rows);
-  rows_hold(&r, 1.0, 2.0, 3.0);
+  rows_hold(&r, 4.0, 8.0, 9.0);
 }
 
 /* ---- a chain in a slot ---- */
 
 #define LINKS 5
+#define MIDDLE 2 /* that is pressed */
 #define EDGE 0.05
 #define PITCH (EDGE + 2e-3)
 #define RADIUS 0.01
@@ -206,7 +207,7 @@ TEST(a_chain_in_a_slot_too_narrow_is_solved)
     w->def.physics_hz = i / 2 == 0 ? 60.0 : 20.0;
     w->hand_def.stiffness = STIFFNESS;
     w->hand_def.radius = RADIUS;
-    cw_start(w, PITCH * (LINKS / 2), 0.0, EDGE - 0.5 * LAYER + RADIUS);
+    cw_start(w, PITCH * MIDDLE, 0.0, EDGE - 0.5 * LAYER + RADIUS);
     cw_go(w, 0.0, 0.0, -PRESSED / (1e-3 * PRESSES), PRESSES);
     cw_move_hand(w, 0.0, 0.0, 0.0);
     const hapi_rows *rows = &w->session->haptic->tick.rows;

@@ -588,6 +588,25 @@ TEST(contacts_that_come_between_leave_the_others_kept)
   }
 }
 
+/* So that what opens and closes does not move the rows of others in each tick. */
+TEST(a_contact_keeps_its_rows_for_longer_than_it_waits_for_them)
+{
+  for (int comes = 0; comes < 2; ++comes) {
+    set_up();
+    f.tick.hashing = false;
+    hapi_model_body *body = box_add(MASS);
+    body->pose.position[2] = (comes ? 2.5e-3 : OPEN) - corner[2];
+    body->twist.linear[2] = comes ? -0.05 : 0.05;
+    model_adopt();
+    floor_adopt(0.5);
+    ticks_run(20); /* 1.5 mm open */
+    CHECK(f.tick.rows.solver.row_count == (comes ? 0 : 12));
+    CHECK(f.tick.rows.kept == (comes ? 0 : 12));
+    ticks_run(20);
+    CHECK(f.tick.rows.solver.row_count == (comes ? 12 : 0));
+  }
+}
+
 /* A pointer that is in touch at the tick's end, and not at its middle, begins a row and takes it
  * back, where contacts had theirs. */
 TEST(a_pointer_that_comes_leaves_the_kept_rows_whole)
