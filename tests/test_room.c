@@ -179,7 +179,7 @@ TEST(many_rows_get_as_many_updates_each_as_few)
   CHECK(updates_at(0, 60000, HAPI_DIAL_DEFAULT) > most / 2);
   CHECK(updates_at(2, 60000, HAPI_DIAL_DEFAULT) < most / 2);
   CHECK(updates_at(0, 60000, 100) == updates_at(0, 60000, HAPI_DIAL_DEFAULT));
-  CHECK(updates_at(0, 60000, 0) == 300); /* who gives accuracy up has it so */
+  CHECK(updates_at(0, 60000, 0) == 600); /* who gives accuracy up has it so */
 }
 
 /* ---- sessions ---- */

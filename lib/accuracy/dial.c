@@ -30,11 +30,11 @@ typedef struct tick_row {
  * new ground. A shorter range is wrong where bodies carry each other, a plane instead of a shape
  * where they roll: the last resort of a budget. */
 static const tick_row tick_rows[] = {
-    {0, 50.0, 300, 0, 0.1, 1, false},
-    {10, 50.0, 300, 0, 0.1, 4, true},
-    {20, 100.0, 600, 0, 0.1, HAP_RANGE_ALL, true},
-    {30, 100.0, 1250, 0, 0.1, HAP_RANGE_ALL, true},
-    {40, 200.0, 2500, 0, 0.05, HAP_RANGE_ALL, true},
+    {0, 50.0, 600, 0, 0.1, 1, false},
+    {10, 50.0, 600, 0, 0.1, 4, true},
+    {20, 100.0, 1250, 0, 0.1, HAP_RANGE_ALL, true},
+    {30, 100.0, 2500, 0, 0.1, HAP_RANGE_ALL, true},
+    {40, 200.0, 5000, 0, 0.05, HAP_RANGE_ALL, true},
     {50, 200.0, 20000, 6, 0.03, HAP_RANGE_ALL, true},
     {70, 333.0, 20000, 8, 0.01, HAP_RANGE_ALL, true},
     {80, 500.0, 20000, 12, 0.003, HAP_RANGE_ALL, true},

@@ -9,6 +9,7 @@
 #include "base/assert.h"
 #include "base/vec.h"
 #include "solver/aggregate.h"
+#include "solver/sweep_trend.h"
 
 /* A direct solve follows each of so many sweeps, then only each so-many-th: where the active sets
  * go in circles, sweeps lead out. */
@@ -29,7 +30,6 @@
  * stack of 30 cubes under a hand gains energy. */
 #define DIRECT_SWEEPS 10u
 #define PACKED_SWEEPS 12u /* where contacts are in packs, not before so many */
-#define RATE_MOST 0.99    /* of sweeps that lead nowhere */
 #define PAIRS_EACH 4u     /* sweeps, of steps of all pairs */
 #define PAIRS_FALL 0.25   /* of what sweeps correct, from one such step to the next */
 
@@ -38,7 +38,10 @@
  * next runs make them. */
 #define LEAVE 16.0
 #define LEAVE_SWEEPS 3u
-#define SPREAD_HEIGHT 8u /* levels: a higher stack is solved at once, one by one (packs.c) */
+#define LEAVE_LIGHT 10.0 /* times the largest correction, of things so light that no hand tells */
+/* Levels. A higher stack is solved at once, and one by one (packs.c): of eight cubes that a hand
+ * leans on, what is left says which of them slide, and the force is off by 0.2 to 6 %. */
+#define SPREAD_HEIGHT 7u
 /* So is what has more rows, is higher and has no step for all pairs: of a wall of eight levels that
  * is pushed a tick took a sixth longer, as the next runs had more to do. */
 #define SPREAD_ROWS 300u
@@ -464,6 +467,12 @@ uint32_t hapi_solver_sweep_cost(const hapi_solver *solver)
                               : solver->row_count;
 }
 
+static void updates_spend(hapi_solver *solver, uint64_t *io_left, uint64_t cost)
+{
+  solver->updates += cost;
+  *io_left -= cost < *io_left ? cost : *io_left;
+}
+
 /* ---- sweeps that look ahead ---- */
 
 /* Many bodies in touch hand an impulse on by one or two of them a sweep, so plain sweeps take as
@@ -506,12 +515,6 @@ static bool way_place(const hapi_solver *solver, sweep_way *out)
   out->vx = out->p + rows;
   out->vp = out->vx + 6 * bodies;
   return true;
-}
-
-static void updates_spend(hapi_solver *solver, uint64_t *io_left, uint64_t cost)
-{
-  solver->updates += cost;
-  *io_left -= cost < *io_left ? cost : *io_left;
 }
 
 static void way_begin(const hapi_solver *solver, sweep_way *way)
@@ -688,14 +691,6 @@ static bool is_settled(const hapi_solver *solver)
                                                   solver->swept.energy2 < solver->coarse.energy2);
 }
 
-/* Of the corrections from sweep to sweep, by those of the last three: forward and backward ones go
- * at rates of their own. */
-static double sweeps_rate(double before2, double before, double now)
-{
-  double rate = before2 > 0.0 ? sqrt(sqrt(now / before2)) : before > 0.0 ? sqrt(now / before) : 0.0;
-  return rate < RATE_MOST ? rate : RATE_MOST;
-}
-
 /* Whether so many times the sweeps that a direct solve costs will do, where something may stay
  * undone. */
 static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t times)
@@ -746,9 +741,11 @@ static bool may_spread(const hapi_solver *solver)
  * better now. */
 static bool may_leave(const hapi_solver *solver, bool tried)
 {
-  return solver->enough > 0 && solver->coarse.energy2 > 0.0 &&
-         solver->residual < solver->coarse.largest &&
-         (tried || solver->swept.energy2 < LEAVE * solver->coarse.energy2);
+  const hapi_coarse *coarse = &solver->coarse;
+  double due = solver->swept.energy2;
+  bool small = solver->residual < coarse->largest && (tried || due < LEAVE * coarse->energy2);
+  bool light = solver->residual < LEAVE_LIGHT * coarse->largest && due < coarse->energy2;
+  return solver->enough > 0 && coarse->energy2 > 0.0 && (small || light);
 }
 
 /* Whether one more direct solve is worth its cost. */
@@ -809,6 +806,8 @@ void hapi_solver_run(hapi_solver *solver)
   uint32_t direct_from = solver->packs.in_use ? PACKED_SWEEPS : 2; /* sweeps */
   double before[2] = {0.0, 0.0}; /* corrected, after the last sweep and the one before */
   double at_pairs = HUGE_VAL;    /* corrected, before the last step of all pairs */
+  hapi_sweep_trend trend;
+  hapi_trend_begin(&trend);
   for (uint32_t rounds = 0; rows > 0;) {
     if (ahead && solver->sweeps >= 2) {
       updates_spend(solver, &left, cost / 4);
@@ -820,12 +819,13 @@ void hapi_solver_run(hapi_solver *solver)
     }
     rows_sweep(solver);
     updates_spend(solver, &left, cost);
-    double rate = sweeps_rate(before[1], before[0], solver->swept.energy2);
+    double rate = hapi_sweeps_rate(before[1], before[0], solver->swept.energy2);
     before[1] = before[0];
     before[0] = solver->swept.energy2;
+    bool ends = hapi_trend_ends(&trend, &solver->swept) && solver->enough > 0 && (tried || !direct);
     bool enough = solver->updates >= solver->enough && may_leave(solver, tried);
-    if (is_settled(solver) ||
-        (solver->sweeps >= 2 && (enough || left < cost || solver->sweeps == solver->max_sweeps))) {
+    if (is_settled(solver) || (solver->sweeps >= 2 && (enough || ends || left < cost ||
+                                                       solver->sweeps == solver->max_sweeps))) {
       break;
     }
     uint32_t of_pairs = pairs_are_due(solver, at_pairs) ? pairs_solve(solver, left) : 0;
@@ -834,6 +834,7 @@ void hapi_solver_run(hapi_solver *solver)
       updates_spend(solver, &left, of_pairs);
       way.begun = false;
       before[0] = before[1] = 0.0;
+      hapi_trend_begin(&trend);
     }
     /* Direct solves may have one half of the budget: where they lead in circles between two sets of
      * active rows, sweeps from the second half still come near, and the next tick starts from
@@ -848,6 +849,7 @@ void hapi_solver_run(hapi_solver *solver)
       tried = tried || solver->direct_solves == accepted;
       way.begun = false;
       before[0] = before[1] = 0.0;
+      hapi_trend_begin(&trend);
       bool first = dearest == 0;
       dearest = spent > dearest ? spent : dearest;
       direct = solver->direct.end != HAPI_DIRECT_DEAR; /* now, and so in the next round */

@@ -35,12 +35,13 @@
 
 #define STILL_EVERY 16 /* ticks: islands that stand still are looked for */
 
-#define COARSE_REST 1e-12 /* J a body, of a sweep's corrections that stay undone in a tick */
-#define COARSE_MOST 1e-10 /* the most, under a hand */
-#define COARSE_FADE 0.98  /* a tick */
-#define COARSE_LEVELS 4.0 /* of a stack: a higher one leans by the square of its height */
-#define COARSE_ROWS 500.0 /* the largest correction of more rows may be larger by the root, */
-#define COARSE_TIMES 2.0  /* up to so many times */
+#define COARSE_REST 1e-12   /* J a body, of a sweep's corrections that stay undone in a tick */
+#define COARSE_MOST 1e-10   /* the most, under a hand */
+#define COARSE_FADE 0.98    /* a tick */
+#define COARSE_LEVELS 4.0   /* of a stack: a higher one leans by the square of its height */
+#define COARSE_ROWS 500.0   /* the largest correction of more rows may be larger by the root, */
+#define COARSE_TIMES 2.0    /* up to so many times */
+#define COARSE_OPENING 1e-5 /* m/s, of joints among contacts */
 
 /* A tick whose solves have taken half as many row updates again as is usual, or what is done within
  * 20 us, leaves the rest to the next ticks, where the rest is little. */
@@ -438,7 +439,7 @@ static void rows_note_unsolved(hapi_rows *rows)
 
 /* What the solves of this tick may leave undone: by the springs to hands. It fades where their
  * forces become less, and stays while a hand that touched is in reach, as one that taps. Joints
- * among contacts are closed: errors of both say which contacts slide. */
+ * among contacts are closed to less: errors of both say which contacts slide. */
 static void rows_set_coarse(hapi_rows *rows, bool reaches, bool joins)
 {
   bool touches = rows->hand < HUGE_VAL;
@@ -455,7 +456,7 @@ static void rows_set_coarse(hapi_rows *rows, bool reaches, bool joins)
   double times = joins ? 1.0 : sqrt((double)rows->solver.row_count / COARSE_ROWS);
   rows->solver.coarse.largest = HAPI_COARSE * hapi_clamp(times, 1.0, COARSE_TIMES);
   bool contacts = rows->solver.row_count > rows->contact_begin;
-  rows->solver.coarse.opening = contacts ? rows->solver.tolerance : HAPI_COARSE;
+  rows->solver.coarse.opening = contacts ? COARSE_OPENING : HAPI_COARSE;
 }
 
 /* Row updates of this tick, as if all rows were kept. */
