@@ -154,6 +154,47 @@ TEST(what_no_hand_can_tell_is_left)
   }
 }
 
+/* ---- another hand ---- */
+
+#define PRESSES 300 /* ticks */
+#define CHANGES 100 /* ticks, that a change of the coupling takes at most */
+
+/* What a direct hand lets stay undone ends where the same hand becomes a god-object, which is held
+ * to its place by rows. */
+TEST(nothing_is_left_to_a_rigid_hand)
+{
+  contact_world *w = cw_new(CW_GRAVITY);
+  hap_pointer_settings settings;
+  int left[2] = {0, 0};
+  cw_add_floor(w);
+  cw_add_cube(w, MASS, EDGE, 0.0, 0.0, 0.5 * EDGE);
+  w->hand_def.radius = RADIUS;
+  cw_start(w, 0.0, 0.0, EDGE + RADIUS + 1e-3);
+  cw_run(w, SETTLES);
+  cw_go(w, 0.0, 0.0, -0.01, PRESSES);
+  const hapi_rows *rows = &w->session->haptic->tick.rows;
+  for (int rigid = 0; rigid < 2; ++rigid) {
+    if (rigid == 1) {
+      hap_pointer_settings_init(&settings, sizeof settings);
+      settings.mask = HAP_SET_COUPLING;
+      settings.coupling = HAP_COUPLING_GOD_OBJECT;
+      settings.coupling_stiffness = 500.0;
+      settings.coupling_damping = 1.0;
+      REQUIRE(hap_pointer_set(w->session, w->hand, &settings) == HAP_OK);
+      cw_run(w, CHANGES);
+    }
+    for (int i = 0; i < PRESSES; ++i) {
+      cw_tick(w);
+      CHECK(cw_norm(w->force) > 1.0);
+      left[rigid] += rows->solver.enough > 0 || rows->solver.coarse.energy2 > 0.0;
+    }
+  }
+  printf("# may leave something in %d ticks of a direct hand, %d of a rigid one\n", left[0],
+         left[1]);
+  CHECK(left[0] > PRESSES / 2 && left[1] == 0);
+  cw_close(w);
+}
+
 /* ---- a tower ---- */
 
 #define TOWER_TICKS 900

@@ -181,6 +181,7 @@ static inline void hapi_spring_note(hapi_rows *rows, const hapi_pointer *pointer
   bool exact = pointer->shape.hull != NULL || pointer->rigid;
   double force2 = exact ? 0.0 : hapi_v3_dot(pointer->wrench.force, pointer->wrench.force);
   double shows = k * k * a;
+  rows->exact_hand = rows->exact_hand || exact;
   if (shows > 0.0) {
     rows->hand = hapi_min(rows->hand, force2 / shows);
   }

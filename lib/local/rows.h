@@ -76,9 +76,10 @@ typedef struct hapi_rows {
   uint32_t aside_count;  /* 0: the last tick had one solve */
   bool swapped;          /* since it began to push out: each solve goes on from its own impulses */
   double drift;          /* 1/s, of the force on a hand, that solves may leave undone; 0: nothing */
-  double hand;  /* J s^2, the least F^2 / (k^2 a) of the tick's springs to hands, with F of the tick
+  double hand; /* J s^2, the least F^2 / (k^2 a) of the tick's springs to hands, with F of the tick
                    before; HUGE_VAL: none */
-  bool touched; /* by a pointer that has been in reach since */
+  bool exact_hand;     /* a hull or a rigid pointer is near in this tick: nothing may stay undone */
+  bool touched;        /* by a pointer that has been in reach since */
   double residual_max; /* m/s; this and the next since start */
   uint64_t sweeps;
   uint32_t unsolved;      /* ticks in a row of which HAPI_UNSOLVED or more was left undone */

@@ -409,7 +409,8 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
   hapi_solver *solver = is->solver;
   /* With heavy bodies on light ones sweeps find far too small normal impulses and slide what should
    * stick; from sticking the set is found. Tried second, as the set from the warm start is mostly
-   * right, and again where neither leads to the end. Of packs it is the first, after 12 sweeps. */
+   * right, and again where neither leads to the end. Of packs it is the first, after 12 sweeps:
+   * what runs have left undone shows as a little sliding. */
   bool sticking = solver->sweeps % 3 == 0;
   double due = hapi_island_inspect(is, sticking);
   uint32_t spent = 0;

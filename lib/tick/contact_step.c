@@ -105,6 +105,7 @@ static void bodies_begin(hapi_bodies *bodies, const hapi_patches *patches, hapi_
   rows->lifted_count = 0;
   solver->apart = true;
   rows->hand = HUGE_VAL;
+  rows->exact_hand = false;
   bodies->resting = bodies->quiet = 0;
   bodies->exact = !(rows->drift > 0.0);
   bool stays = patches != NULL && patches->contact_count > 0;
@@ -451,7 +452,7 @@ static void rows_set_coarse(hapi_rows *rows, bool reaches, bool joins)
     before = hapi_max(drift * drift * rows->hand, COARSE_FADE * before);
   }
   double most = (rows->touched ? COARSE_MOST : COARSE_REST) * (double)rows->solver.body_count;
-  most = rows->drift > 0.0 ? most : 0.0;
+  most = rows->drift > 0.0 && !rows->exact_hand ? most : 0.0;
   rows->solver.coarse.energy2 = rows->touched ? hapi_min(before, most) : most;
   double times = joins ? 1.0 : sqrt((double)rows->solver.row_count / COARSE_ROWS);
   rows->solver.coarse.largest = HAPI_COARSE * hapi_clamp(times, 1.0, COARSE_TIMES);
