@@ -110,6 +110,7 @@ static hapi_row *add_contact(uint32_t a, uint32_t b, const double point[3], int 
   for (int k = 1; k <= 2; ++k) {
     hapi_row *friction = add_row(a, b, point, n[(axis + k) % 3]);
     friction->mu = mu;
+    friction->hi = 0.0;
     friction->normal = normal;
   }
   return row;
@@ -449,6 +450,7 @@ static void make_random(uint32_t number)
     if (i % 3 > 0 && number % 5 != 0) {
       row->normal = (int32_t)(i - i % 3);
       row->mu = random_uniform(0.0, 0.6);
+      row->hi = 0.0;
     } else if (number % 5 == 0) {
       row->lo = random_uniform(-0.2, 0.0);
       row->hi = random_uniform(0.0, 0.2);

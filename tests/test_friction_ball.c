@@ -87,6 +87,7 @@ static uint32_t add_pointer(uint32_t body, uint32_t pointer, double mu, int ball
     if (i > 0) {
       row->normal = (int32_t)first;
       row->mu = mu;
+      row->hi = 0.0;
       row->ball = i == 1 ? (uint8_t)ball : 0;
       row->round = (uint8_t)(i - 1);
     }
@@ -106,6 +107,7 @@ static void add_ground(uint32_t body)
       hapi_row *row = add_row(body, 0, axes[i], arm);
       row->normal = normal;
       row->mu = 0.4;
+      row->hi = 0.0;
     }
   }
 }

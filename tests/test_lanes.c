@@ -76,9 +76,11 @@ static void problem_make(uint64_t seed, uint32_t budget, uint32_t direct_rows)
     uint32_t a = 1 + c % (BODIES - 1);
     uint32_t b = c % 3 == 0 ? 0 : a > 1 ? a - 1 : BODIES - 1;
     for (int part = 0; part < 3; ++part) {
-      row_fill(&wide.rows[count + (uint32_t)part], a, b, inertia);
-      wide.rows[count + (uint32_t)part].normal = part == 0 ? -1 : (int32_t)count;
-      wide.rows[count + (uint32_t)part].mu = part == 0 ? 0.0 : 0.6;
+      hapi_row *row = &wide.rows[count + (uint32_t)part];
+      row_fill(row, a, b, inertia);
+      row->normal = part == 0 ? -1 : (int32_t)count;
+      row->mu = part == 0 ? 0.0 : 0.6;
+      row->hi = part == 0 ? HUGE_VAL : 0.0;
     }
     count += 3;
   }
@@ -171,7 +173,7 @@ static void triples_push(problem *p)
   for (uint32_t i = 0; i < 3 * CONTACTS; i += 3) {
     for (uint32_t k = i; p->rows[i].triple && k < i + 3; ++k) {
       hapi_madd6(p->v[p->rows[k].a], p->rows[k].impulse, p->rows[k].ba);
-      if (p->rows[k].paired) {
+      if (hapi_row_moves_b(&p->rows[k])) {
         hapi_madd6(p->v[p->rows[k].b], p->rows[k].impulse, p->rows[k].bb);
       }
     }

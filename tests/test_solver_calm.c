@@ -235,6 +235,7 @@ static void make_heap(uint32_t bodies)
       hapi_row *row = add_row(a, b, j[0], j[1]);
       row->impulse = pow(10.0, random_draw(-3.0, 2.0));
       row->mu = part > 0 ? random_draw(0.0, 10.0) : 0.0;
+      row->hi = part > 0 ? 0.0 : HUGE_VAL;
       row->normal = part > 0 ? normal : -1;
     }
   }

@@ -114,6 +114,7 @@ static void foot_stand(uint32_t foot, double mu)
       row = row_add(foot, GROUND, point, axes[k]);
       row->normal = normal;
       row->mu = mu;
+      row->hi = 0.0;
     }
   }
 }

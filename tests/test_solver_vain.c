@@ -45,7 +45,7 @@ static figures push_row(int count, double accuracy)
   for (int i = 0; i < SETTLES + TICKS; ++i) {
     uint32_t rest = solver->rest.runs;
     cw_tick(w);
-    double updates = (double)(cw_stats(w).contact.sweeps - before) * solver->row_count;
+    double updates = (double)(cw_stats(w).contact.sweeps - before) * hapi_solver_sweep_cost(solver);
     before = cw_stats(w).contact.sweeps;
     if (i >= SETTLES) {
       out.rests += solver->rest.rows > 0;

@@ -645,7 +645,7 @@ static void rows_note_plain(const hapi_row *normal, const placed_contact *c,
                             const hapi_tick_facts *facts, hapi_contact_kept *out)
 {
   out->least = -c->surface->layer - PUSH_OUT_SLOP;
-  out->plain = normal->triple != 0 && (normal->paired || normal->single) && out->all &&
+  out->plain = normal->triple != 0 && (hapi_row_moves_b(normal) || normal->single) && out->all &&
                c->gap <= 0.0 && c->gap >= out->least && !facts->bounces;
   out->by_mass = normal->triple == HAPI_TRIPLE_BY_MASS;
 }

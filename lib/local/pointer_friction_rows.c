@@ -105,7 +105,9 @@ static bool add_friction_row(double period, const hapi_local_contact *contact,
     double load = normal->hi + period * contact->feel.pull;
     row->lo = row->hi = fmin(row->impulse, contact->feel.mu * load);
     row->softness = row->target = 0.0;
-  } else if (!hapi_spring_soften(row, at->pointer, &p, period)) {
+  } else if (hapi_spring_soften(row, at->pointer, &p, period)) {
+    row->hi = 0.0; /* the normal's load alone */
+  } else {
     return false;
   }
   if (at->pointer->rigid) {

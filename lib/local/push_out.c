@@ -70,6 +70,24 @@ static void impulses_swap(hapi_rows *rows)
   solver->owes = false;
 }
 
+/* The impulses at hand are those of the first solve. What is pushed out on opposite sides is held
+ * by the friction of loads that the second solve does not know of: two that cancel have no part in
+ * velocities. Its frictions have the loads of the first one at least, so that nothing gains speed
+ * that stays in its place. */
+static void loads_keep(hapi_rows *rows, bool keeps)
+{
+  hapi_row *of = rows->solver.rows;
+  for (uint32_t i = 0; i < rows->lifted_count; ++i) {
+    uint32_t normal = rows->lifted[i].row;
+    double load = keeps && of[normal].impulse > 0.0 ? of[normal].impulse : 0.0;
+    for (uint32_t k = normal + 1; k < rows->solver.row_count && of[k].normal == (int32_t)normal;
+         ++k) {
+      of[k].hi = load;
+    }
+  }
+  rows->solver.packs.known.alike = false;
+}
+
 static void impulses_put_aside(hapi_rows *rows)
 {
   for (uint32_t i = 0; i < rows->solver.row_count; ++i) {
@@ -103,8 +121,16 @@ void hapi_push_out_stop(hapi_rows *rows)
     hapi_packs_store(&rows->solver.packs, rows->solver.rows);
   }
   if (rows->swapped) {
+    loads_keep(rows, true);
     impulses_swap(rows);
   } else {
     impulses_put_aside(rows);
+  }
+}
+
+void hapi_push_out_end(hapi_rows *rows)
+{
+  if (rows->swapped) {
+    loads_keep(rows, false);
   }
 }

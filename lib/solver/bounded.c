@@ -130,7 +130,7 @@ static void set_find(const hapi_bounded *b, bool lagged, active_set *out)
     if (inside[k]) {
       out->free[out->count++] = k;
     } else if (!lagged && is_friction(b, k) && inside[b->normal[k]] && hi > 0.0 &&
-               isfinite(row->mu)) {
+               isfinite(row->mu) && hapi_friction_follows(b->rows, row)) {
       out->share[k] = row->impulse > 0.0 ? row->mu : -row->mu;
     }
   }
@@ -152,7 +152,8 @@ static void set_drop(const hapi_bounded *b, active_set *s, uint32_t k, double ch
   for (uint32_t i = 0; i < b->count; ++i) {
     s->share[i] = b->normal[i] == k ? 0.0 : s->share[i];
   }
-  if (is_friction(b, k) && pushes && !s->lagged) {
+  if (is_friction(b, k) && pushes && !s->lagged &&
+      hapi_friction_follows(b->rows, bounded_row(b, k))) {
     s->share[k] = change > 0.0 ? bounded_row(b, k)->mu : -bounded_row(b, k)->mu;
   }
 }
@@ -232,7 +233,8 @@ static double set_reach(const hapi_bounded *b, const active_set *s, const double
   *out_stop = b->count;
   for (uint32_t k = 0; k < b->count; ++k) {
     const hapi_row *row = bounded_row(b, k);
-    const bool widens = !s->lagged && is_friction(b, k) && isfinite(row->mu);
+    const bool widens =
+        !s->lagged && is_friction(b, k) && isfinite(row->mu) && hapi_friction_follows(b->rows, row);
     const double wider = widens ? row->mu * change[b->normal[k]] : 0.0;
     const double up = change[k] - wider;
     const double down = -change[k] - wider;

@@ -22,6 +22,7 @@
  * all of the budget is for sweeps. Of costly ones the rest doubles each time that the next one is
  * in vain as well. */
 #define VAIN_COST 4000u /* row updates */
+#define VAIN_SWEEPS 8u  /* until the next one: from the same rows it would be in vain as well */
 #define VAIN_RUNS 4u
 #define VAIN_REST 16u
 #define VAIN_REST_MOST 256u
@@ -66,7 +67,7 @@ static bool has_bounds(const hapi_solver *solver, uint32_t index)
   if (row->normal < 0) {
     return row->lo <= row->hi;
   }
-  return row->mu >= 0.0 && (uint32_t)row->normal < index &&
+  return row->mu >= 0.0 && row->hi >= 0.0 && row->hi < HUGE_VAL && (uint32_t)row->normal < index &&
          same_bodies(row, &solver->rows[row->normal]);
 }
 
@@ -74,26 +75,26 @@ static bool has_bounds(const hapi_solver *solver, uint32_t index)
 static void row_prepare(hapi_solver *solver, uint32_t index)
 {
   hapi_row *row = &solver->rows[index];
-  double of_a = hapi_dot6(row->ja, row->ba); /* j A j^T: 0 only if a does not respond to j */
+  double of_a = hapi_dot6(row->ja, row->ba); /* j A j^T */
   double of_b = row->single ? 0.0 : hapi_dot6(row->jb, row->bb);
   double d = of_a + of_b + row->softness;
   row->inverse = 0.0;
   row->triple = 0;
+  row->moves = (uint8_t)((of_a != 0.0 ? HAPI_MOVES_A : 0u) | (of_b != 0.0 ? HAPI_MOVES_B : 0u));
   if (!row_is_valid(solver, row, d) || !has_bounds(solver, index)) {
     row->impulse = 0.0;
     return;
   }
   row->inverse = 1.0 / d;
   row->response = d;
-  row->paired = of_b != 0.0;
-  bool moved = !row->paired && !row->single; /* by a partner that does not respond */
+  bool moved = !hapi_row_moves_b(row) && !row->single; /* by a partner that does not respond */
   row->drive = row->target - (moved ? hapi_dot6(row->jb, solver->v[row->b]) : 0.0);
 }
 
 static double rows_couple(const hapi_row *row, const hapi_row *other)
 {
   double k = hapi_dot6(row->ja, other->ba);
-  return row->paired ? k + hapi_dot6(row->jb, other->bb) : k;
+  return hapi_row_moves_b(row) ? k + hapi_dot6(row->jb, other->bb) : k;
 }
 
 /* A normal and its two frictions: one update takes all three. `last` is the second friction. */
@@ -130,7 +131,7 @@ static void warm_start(hapi_solver *solver, hapi_row *row)
     return;
   }
   hapi_madd6(solver->v[row->a], row->impulse, row->ba);
-  if (row->paired) {
+  if (hapi_row_moves_b(row)) {
     hapi_madd6(solver->v[row->b], row->impulse, row->bb);
   }
 }
@@ -149,7 +150,8 @@ void hapi_single_ready(hapi_solver *solver, uint32_t index, double response)
   hapi_row *row = &solver->rows[index];
   double d = response + row->softness;
   row->inverse = 0.0;
-  row->triple = row->paired = 0;
+  row->triple = 0;
+  row->moves = response != 0.0 ? HAPI_MOVES_A : 0;
   if (!row_is_valid(solver, row, d) || !(row->lo <= row->hi)) {
     row->impulse = 0.0;
     return;
@@ -257,15 +259,17 @@ static void update_triple(hapi_solver *solver, hapi_row *r, hapi_corrections *io
     e[i] = hapi_row_error(solver, &r[i]);
   }
   d[0] = row_change(&r[0], e[0], r[0].lo, r[0].hi);
-  if (d[0] == 0.0 && r[0].impulse <= 0.0 && r[1].impulse == 0.0 && r[2].impulse == 0.0) {
+  if (d[0] == 0.0 && r[0].impulse <= 0.0 && r[1].impulse == 0.0 && r[2].impulse == 0.0 &&
+      r[1].hi <= 0.0) {
     return; /* a contact that does not push */
   }
-  double most = hapi_friction_most(&r[1], r[0].impulse);
+  double load = hapi_max(r[0].impulse, r[1].hi);
+  double most = hapi_friction_most(&r[1], load);
   d[1] = row_change(&r[1], e[1] - r[1].coupling[0] * d[0], -most, most);
-  most = hapi_friction_most(&r[2], r[0].impulse);
+  most = hapi_friction_most(&r[2], load);
   d[2] = row_change(&r[2], e[2] - r[2].coupling[0] * d[0] - r[2].coupling[1] * d[1], -most, most);
   push_triple(solver->v[r->a], d, r[0].ba, r[1].ba, r[2].ba);
-  if (r->paired) {
+  if (hapi_row_moves_b(r)) {
     push_triple(solver->v[r->b], d, r[0].bb, r[1].bb, r[2].bb);
   }
   for (int i = 0; i < 3; ++i) {
@@ -281,7 +285,7 @@ static void triple_start(hapi_solver *solver, const hapi_row *r)
     return;
   }
   push_triple(solver->v[r->a], d, r[0].ba, r[1].ba, r[2].ba);
-  if (r->paired) {
+  if (hapi_row_moves_b(r)) {
     push_triple(solver->v[r->b], d, r[0].bb, r[1].bb, r[2].bb);
   }
 }
@@ -306,7 +310,7 @@ static void triples_start(hapi_solver *solver)
 void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count)
 {
   hapi_row *r = &solver->rows[first];
-  bool moved = !r->paired && !r->single; /* by a partner that does not respond */
+  bool moved = !hapi_row_moves_b(r) && !r->single; /* by a partner that does not respond */
   HAPI_ASSERT(r->inverse != 0.0 && r->a < solver->body_count);
   for (uint32_t i = 0; moved && i < count; ++i) {
     r[i].drive = r[i].target - hapi_dot6(r[i].jb, solver->v[r[i].b]);
@@ -847,6 +851,9 @@ void hapi_solver_run(hapi_solver *solver)
       updates_spend(solver, &left, spent);
       solver->direct.cost = spent;
       tried = tried || solver->direct_solves == accepted;
+      if (solver->direct_solves == accepted && solver->coarse.energy2 > 0.0) {
+        direct_from = solver->sweeps + VAIN_SWEEPS;
+      }
       way.begun = false;
       before[0] = before[1] = 0.0;
       hapi_trend_begin(&trend);

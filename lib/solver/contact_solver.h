@@ -21,6 +21,7 @@
 #include <stdint.h>
 
 #include "base/six.h"
+#include "base/vec.h"
 #include "solver/packs.h"
 #include "solver/row.h"
 
@@ -182,15 +183,27 @@ static inline double hapi_friction_most(const hapi_row *friction, double load)
   return load > 0.0 ? friction->mu * load : 0.0; /* mu may be infinite: no 0 x infinity */
 }
 
-/* N s, that friction goes by: a normal that sticks holds its friction, too. */
+/* N s, of a normal: one that sticks holds its friction, too. */
 static inline double hapi_row_load(const hapi_row *normal)
 {
   return normal->impulse - normal->lo;
 }
 
+/* N s, that a friction goes by. */
+static inline double hapi_friction_load(const hapi_row *rows, const hapi_row *friction)
+{
+  return hapi_max(hapi_row_load(&rows[friction->normal]), friction->hi);
+}
+
+/* Whether it grows and shrinks with its normal. */
+static inline bool hapi_friction_follows(const hapi_row *rows, const hapi_row *friction)
+{
+  return hapi_row_load(&rows[friction->normal]) >= friction->hi;
+}
+
 static inline double hapi_ball_radius(const hapi_row *rows, const hapi_row *first)
 {
-  return hapi_friction_most(first, hapi_row_load(&rows[first->normal]));
+  return hapi_friction_most(first, hapi_friction_load(rows, first));
 }
 
 /* The nearest impulses of the ball to what the errors of its rows ask for, and whether that is out
@@ -204,12 +217,6 @@ double hapi_ball_update(hapi_solver *solver, hapi_row *first);
 /* Solves the islands that still need it, for at most `budget` row updates; returns the cost in row
  * updates. Sets end and residual of `direct`. Rows are prepared, v has the impulses. */
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget);
-
-/* Whether a responds: j A j^T is 0 only if it does not. */
-static inline bool hapi_row_moves_a(const hapi_row *row)
-{
-  return hapi_dot6(row->ja, row->ba) != 0.0;
-}
 
 static inline double hapi_clamp(double x, double lo, double hi)
 {
@@ -233,7 +240,7 @@ static inline void hapi_row_bounds(const hapi_row *rows, const hapi_row *row, do
   *out_lo = row->lo;
   *out_hi = row->hi;
   if (row->normal >= 0) {
-    *out_hi = hapi_friction_most(row, hapi_row_load(&rows[row->normal]));
+    *out_hi = hapi_friction_most(row, hapi_friction_load(rows, row));
     if (row->round > 0) {
       *out_hi = hapi_row_left(row, *out_hi);
     }
@@ -246,7 +253,7 @@ static inline double hapi_row_error(const hapi_solver *solver, const hapi_row *r
 {
   double rest = row->drive - row->softness * row->impulse;
   double w = hapi_dot6(row->ja, solver->v[row->a]);
-  if (row->paired) {
+  if (hapi_row_moves_b(row)) {
     w += hapi_dot6(row->jb, solver->v[row->b]);
   }
   return rest - w;
@@ -263,7 +270,7 @@ static inline void hapi_row_push(hapi_solver *solver, hapi_row *row, double chan
 {
   row->impulse += change;
   hapi_madd6(solver->v[row->a], change, row->ba);
-  if (row->paired) {
+  if (hapi_row_moves_b(row)) {
     hapi_madd6(solver->v[row->b], change, row->bb);
   }
 }

@@ -37,10 +37,15 @@ typedef struct lists {
 
 static void chain_rows(hapi_solver *solver, uint16_t *leaf, lists *out)
 {
+  const hapi_row *last = NULL;
+  uint16_t r = 0;
   for (uint32_t i = solver->row_count; i-- > 0;) {
     hapi_row *row = &solver->rows[i];
     if (row->inverse != 0.0) {
-      uint16_t r = hapi_root(leaf, (uint16_t)(hapi_row_moves_a(row) ? row->a : row->b));
+      if (!hapi_row_ties_same(row, last)) {
+        r = hapi_root(leaf, (uint16_t)(hapi_row_moves_a(row) ? row->a : row->b));
+      }
+      last = row;
       row->next = out->leaf_head[r];
       out->leaf_tail[r] = out->leaf_head[r] == HAPI_NO_SOLVER_ROW ? i : out->leaf_tail[r];
       out->leaf_head[r] = i;
@@ -72,13 +77,18 @@ static void islands_split(hapi_solver *solver, lists *out)
 {
   uint16_t leaf[HAPI_SOLVER_BODIES];
   uint16_t whole[HAPI_SOLVER_BODIES];
+  const hapi_row *last = NULL;
   for (uint32_t i = 0; i < solver->body_count; ++i) {
     leaf[i] = whole[i] = (uint16_t)i;
     out->head[i] = out->leaf_head[i] = HAPI_NO_SOLVER_ROW;
   }
   for (uint32_t i = 0; i < solver->row_count; ++i) {
     const hapi_row *row = &solver->rows[i];
-    if (row->inverse != 0.0 && row->paired && hapi_row_moves_a(row)) {
+    if (row->inverse == 0.0 || hapi_row_ties_same(row, last)) {
+      continue;
+    }
+    last = row;
+    if (hapi_row_moves_b(row) && hapi_row_moves_a(row)) {
       hapi_unite(whole, row->a, row->b);
       if (!hapi_is_hub(solver, row->b)) {
         hapi_unite(leaf, row->a, row->b);
@@ -115,7 +125,7 @@ static bool island_improve(hapi_island *is, double before, bool last, double *ou
       hapi_island_settle(is);
       due = hapi_island_inspect(is, false);
     }
-    if (due < is->solver->tolerance) {
+    if (due < is->solver->tolerance || is->settled) {
       *out_due = due;
       return true; /* nothing to save, nothing to restore */
     }
@@ -140,10 +150,10 @@ static uint32_t island_damp(hapi_island *is, uint32_t step, double *io_due, bool
   is->softening = DAMPED;
   (void)hapi_island_inspect(is, false);
   hapi_island_save(is);
-  for (*out_better = false; falls && rounds < DAMPED_ROUNDS; ++rounds) {
+  for (*out_better = false; falls && !is->settled && rounds < DAMPED_ROUNDS; ++rounds) {
     hapi_island_solve(is);
     double due = hapi_island_inspect(is, false);
-    falls = hapi_island_rise(is, is->saved_impulse, is->saved_error) < 0.0;
+    falls = is->settled || hapi_island_rise(is, is->saved_impulse, is->saved_error) < 0.0;
     if (falls) {
       *io_due = due;
       *out_better = true;
@@ -179,7 +189,7 @@ static void hubs_hold(const hapi_island *is, const hub_state *hubs)
 
 static bool touches_hub(const hapi_solver *solver, const hapi_row *row)
 {
-  return row->paired && hapi_is_hub(solver, row->b);
+  return hapi_row_moves_b(row) && hapi_is_hub(solver, row->b);
 }
 
 /* The velocities of the hubs that the impulses make, and the errors with them. */
@@ -384,7 +394,9 @@ static uint32_t solve_whole(hapi_island *is, uint32_t step, uint32_t budget, dou
   if (damped) {
     --solver->direct.damped;
     spent = island_damp(is, step, io_due, &better);
-    (void)hapi_island_inspect(is, false);
+    if (!better || *io_due > HAPI_COARSE) {
+      (void)hapi_island_inspect(is, false);
+    }
   }
   if (!better && cost <= budget - spent) {
     bool last = 2 * (uint64_t)(budget - spent - cost) <= solver->update_budget;

@@ -18,8 +18,10 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "solver/island_pair.h"
 
 #define ROW_MADDS 300    /* to assemble, solve and check a row, in multiply-adds */
+#define SETTLED 0.25     /* of what may be left: islands add up, and rows say it one by one */
 #define MADDS_PER_ROW 36 /* multiply-adds in the time of one row update */
 
 /* ---- sets of bodies ---- */
@@ -87,7 +89,8 @@ static void row_classify(hapi_island *is, uint32_t i, bool at_bound, double hi, 
   if (!at_bound || (sticking && row->normal >= 0 && hi > 0.0)) {
     row->state = HAPI_ROW_FREE;
     is->gain[i] = 1.0 / (row->softness + is->softening * row->response);
-  } else if (row->normal >= 0 && hi > 0.0 && rows[row->normal].state == HAPI_ROW_FREE) {
+  } else if (row->normal >= 0 && hi > 0.0 && rows[row->normal].state == HAPI_ROW_FREE &&
+             hapi_friction_follows(rows, row)) {
     row->state = HAPI_ROW_TIED;
     is->gain[i] = (row->impulse > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
   }
@@ -119,7 +122,7 @@ static void slide_ball(hapi_island *is, uint32_t first, double radius, const dou
 
 /* The states of frictions that are one vector: free, or along the force and as large as the normal
  * lets it, while they turn with the slip. */
-static double inspect_ball(hapi_island *is, uint32_t first, bool sticking)
+static double inspect_ball(hapi_island *is, uint32_t first, bool sticking, double *io_energy2)
 {
   hapi_row *row = &is->solver->rows[first];
   double radius = hapi_ball_radius(is->solver->rows, row);
@@ -133,6 +136,10 @@ static double inspect_ball(hapi_island *is, uint32_t first, bool sticking)
   }
   double due = hapi_ball_wanted(row, radius, is->error + first, wanted, &slides);
   bool inside = !slides || norm2 < (1.0 - 1e-9) * radius * radius;
+  for (uint32_t i = 0; i < row->ball; ++i) {
+    double change = wanted[i] - row[i].impulse;
+    *io_energy2 += change * change * row[i].response;
+  }
   for (uint32_t i = 0; i < row->ball && radius > 0.0 && (inside || sticking); ++i) {
     row[i].state = HAPI_ROW_FREE;
     is->gain[first + i] = 1.0 / (row[i].softness + is->softening * row[i].response);
@@ -150,6 +157,8 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
   const hapi_solver *solver = is->solver;
   double largest = 0.0;
   double sum = 0.0;
+  double energy2 = 0.0;
+  double opening = 0.0;
   is->free_rows = 0;
   is->used_rows = 0;
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = solver->rows[i].next) {
@@ -157,7 +166,7 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
     double lo;
     double hi;
     if (row->ball > 0 || row->round > 0) {
-      double due = row->ball > 0 ? inspect_ball(is, i, sticking) : 0.0;
+      double due = row->ball > 0 ? inspect_ball(is, i, sticking, &energy2) : 0.0;
       largest = due <= largest ? largest : due;
       continue;
     }
@@ -166,11 +175,16 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
     is->error[i] = hapi_row_error(solver, row);
     double wanted = p + is->error[i] * row->inverse;
     bool inside = (p > lo && p < hi) || (wanted > lo && wanted < hi);
-    double due = fabs(hapi_clamp(wanted, lo, hi) - p) * row->response;
+    double change = fabs(hapi_clamp(wanted, lo, hi) - p);
+    double due = change * row->response;
     largest = due > largest ? due : largest;
+    opening = lo == -HUGE_VAL && hi == HUGE_VAL && due > opening ? due : opening;
+    energy2 += change * due;
     sum += due + is->error[i];
     row_classify(is, i, !inside, hi, sticking);
   }
+  is->settled = largest < solver->coarse.largest && opening <= solver->coarse.opening &&
+                energy2 < SETTLED * solver->coarse.energy2;
   return largest + 0.0 * sum; /* NaN if one was: comparisons and cuts at bounds lose it */
 }
 
@@ -239,20 +253,29 @@ static bool add_body(hapi_island *is, uint32_t body)
 bool hapi_island_gather(hapi_island *is)
 {
   const hapi_row *rows = is->solver->rows;
+  const hapi_row *last = NULL;
   is->count = 0;
   memset(is->local, 0xff, is->solver->body_count * sizeof is->local[0]);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
-    bool takes_b = rows[i].paired && !(is->held && hapi_is_hub(is->solver, rows[i].b));
+    if (hapi_row_ties_same(&rows[i], last)) {
+      continue;
+    }
+    last = &rows[i];
+    bool takes_b = hapi_row_moves_b(&rows[i]) && !(is->held && hapi_is_hub(is->solver, rows[i].b));
     if ((hapi_row_moves_a(&rows[i]) && !add_body(is, rows[i].a)) ||
         (takes_b && !add_body(is, rows[i].b))) {
       return false;
     }
   }
+  last = NULL;
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
+    if (hapi_row_ties_same(&rows[i], last)) {
+      continue;
+    }
+    last = &rows[i];
     uint16_t a = is->local[rows[i].a];
     uint16_t b = is->local[rows[i].b];
-    if (a != HAPI_NO_BODY &&
-        b != HAPI_NO_BODY) { /* a body on rails may answer to some of its rows only */
+    if (a != HAPI_NO_BODY && b != HAPI_NO_BODY) {
       set_add(&is->link[a], b);
       set_add(&is->link[b], a);
     }
@@ -322,7 +345,7 @@ static void add_outer(double block[36], double s, const double b[6], const doubl
 static void add_row(hapi_island *is, uint16_t to, double s, const double b[6], const hapi_row *from)
 {
   uint16_t a = is->local[from->a];
-  uint16_t other = from->paired ? is->local[from->b] : HAPI_NO_BODY;
+  uint16_t other = hapi_row_moves_b(from) ? is->local[from->b] : HAPI_NO_BODY;
   if (to != HAPI_NO_BODY && a != HAPI_NO_BODY) {
     add_outer(is->blocks[is->block[to][a]], s, b, from->ja);
   }
@@ -342,7 +365,7 @@ static inline void add_drive(hapi_island *is, const hapi_row *row, drive d)
 {
   add_row(is, is->local[row->a], d.gain, row->ba, d.from);
   add_to(is, is->local[row->a], d.gain * d.error, row->ba);
-  if (row->paired) {
+  if (hapi_row_moves_b(row)) {
     add_row(is, is->local[row->b], d.gain, row->bb, d.from);
     add_to(is, is->local[row->b], d.gain * d.error, row->bb);
   }
@@ -357,6 +380,35 @@ static void add_sliding(hapi_island *is, uint32_t index)
   }
 }
 
+/* A contact whose bodies answer by their mass. */
+static bool goes_with_pair(const hapi_island *is, const hapi_row *row)
+{
+  return row->triple == HAPI_TRIPLE_BY_MASS && is->solver->packs.work != NULL;
+}
+
+/* Of a normal: it and its frictions. */
+static void add_contact(hapi_island *is, uint32_t normal, hapi_pair_sum *io)
+{
+  const hapi_row *rows = &is->solver->rows[normal];
+  hapi_pair_drive by[3];
+  bool any = false;
+  for (uint32_t i = 0; i < 3; ++i) {
+    const bool used = rows[i].state != HAPI_ROW_FIXED;
+    const drive d = drive_of(is, &rows[i], normal + i);
+    by[i] = (hapi_pair_drive){d.from, used ? d.gain : 0.0, used ? d.error : 0.0};
+    any = any || used;
+  }
+  if (!any) {
+    return;
+  }
+  if (io->first == NULL || io->first->a != rows->a || io->first->b != rows->b ||
+      !hapi_same_directions(io->first, rows)) {
+    hapi_pair_enter(is, io);
+    hapi_pair_begin(rows, io);
+  }
+  hapi_pair_add(io, rows, by);
+}
+
 /* Matrix and right side, dv = sum of gain b e, with the errors of the last look. One walk for
  * both: the rows are more than fits into a near cache. */
 static void matrix_assemble(hapi_island *is)
@@ -369,14 +421,19 @@ static void matrix_assemble(hapi_island *is)
       is->blocks[is->block[i][i]][k] = 1.0;
     }
   }
+  hapi_pair_sum pair = {NULL};
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     const hapi_row *row = &rows[i];
-    if (row->state == HAPI_ROW_SLIDING) {
+    if (goes_with_pair(is, row)) {
+      add_contact(is, i, &pair);
+      i += 2; /* its frictions */
+    } else if (row->state == HAPI_ROW_SLIDING) {
       add_sliding(is, i);
     } else if (row->state != HAPI_ROW_FIXED) {
       add_drive(is, row, drive_of(is, row, i));
     }
   }
+  hapi_pair_enter(is, &pair);
 }
 
 /* m = m^-1, by steps of Gauss and Jordan: row k by the pivot, the others freed of column k, in
@@ -490,7 +547,7 @@ static void restore_velocities(hapi_island *is)
 static inline double drive_answer(const hapi_island *is, drive d)
 {
   double w = row_moved(is, is->local[d.from->a], d.from->ja);
-  if (d.from->paired) {
+  if (hapi_row_moves_b(d.from)) {
     w += row_moved(is, is->local[d.from->b], d.from->jb);
   }
   return d.gain * (d.error - w);

@@ -37,6 +37,7 @@ typedef struct hapi_island {
   uint32_t used_rows; /* free or tied */
   uint32_t count;     /* bodies */
   uint32_t block_count;
+  bool settled; /* when last inspected: what is due may be left, of this island */
   uint16_t local[HAPI_SOLVER_BODIES]; /* body -> index in the island */
   uint16_t body[HAPI_ISLAND_BODIES];
   uint16_t pivot[HAPI_ISLAND_BODIES];     /* order of elimination */
@@ -59,6 +60,13 @@ typedef struct hapi_island {
 static inline bool hapi_is_hub(const hapi_solver *solver, uint32_t body)
 {
   return body + solver->hub_count >= solver->body_count;
+}
+
+/* Whether a row ties the same bodies as another one, or NULL: those of a contact or joint stand
+ * together. A body on rails may answer to some of its rows only. */
+static inline bool hapi_row_ties_same(const hapi_row *row, const hapi_row *other)
+{
+  return other != NULL && row->a == other->a && row->b == other->b && row->moves == other->moves;
 }
 
 /* Sets of bodies, each named by its lowest: parent[i] begins as i. */

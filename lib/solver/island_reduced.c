@@ -31,7 +31,7 @@ static bool row_is_bounded(const hapi_row *row)
 
 static uint16_t local_of_b(const hapi_island *is, const hapi_row *row)
 {
-  return row->paired ? is->local[row->b] : HAPI_NO_BODY;
+  return hapi_row_moves_b(row) ? is->local[row->b] : HAPI_NO_BODY;
 }
 
 static void answer_push(hapi_island *is, const hapi_row *row, double impulse)

@@ -44,10 +44,11 @@ static HAPI_FOUR_INLINE void contact_update(const hapi_pack_contact *c,
   d[0] = cut_normal(hapi_four_mul(missing[0], hapi_four_load(c->inverse[0])), &p[0]);
   hapi_four e1 = hapi_four_sub(missing[1], hapi_four_mul(hapi_four_load(c->coupling[0]), d[0]));
   hapi_four e2 = hapi_four_sub(missing[2], hapi_four_mul(hapi_four_load(c->coupling[1]), d[0]));
-  hapi_four most = hapi_four_mul(hapi_four_load(c->mu[0]), p[0]);
+  hapi_four load = hapi_four_max(p[0], hapi_four_load(c->load));
+  hapi_four most = hapi_four_mul(hapi_four_load(c->mu[0]), load);
   d[1] = cut_friction(hapi_four_mul(e1, hapi_four_load(c->inverse[1])), most, &p[1]);
   e2 = hapi_four_sub(e2, hapi_four_mul(hapi_four_load(c->coupling[2]), d[1]));
-  most = hapi_four_mul(hapi_four_load(c->mu[1]), p[0]);
+  most = hapi_four_mul(hapi_four_load(c->mu[1]), load);
   d[2] = cut_friction(hapi_four_mul(e2, hapi_four_load(c->inverse[2])), most, &p[2]);
   for (int i = 0; i < 3; ++i) {
     hapi_four correction = hapi_four_mul(d[i], hapi_four_load(c->response[i]));

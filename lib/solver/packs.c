@@ -2,7 +2,6 @@
  * SPDX-License-Identifier: MIT */
 #include "solver/packs.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "base/assert.h"
@@ -33,6 +32,7 @@ static void lane_set_impulses(const hapi_packs *packs, uint32_t place, const hap
     packs->contacts[at].drive[i][lane] = row[i].drive;
     packs->impulse[at][i][lane] = row[i].impulse;
   }
+  packs->contacts[at].load[lane] = row[1].hi;
 }
 
 static void lane_get_impulses(const hapi_packs *packs, uint32_t place, hapi_row *row)
@@ -46,18 +46,10 @@ static void lane_get_impulses(const hapi_packs *packs, uint32_t place, hapi_row 
  * ask for. */
 static void lane_set_drives(const hapi_packs *packs, uint32_t place, const hapi_row *row)
 {
-  int changed = row->paired || row->single ? 1 : 3;
+  int changed = hapi_row_moves_b(row) || row->single ? 1 : 3;
   for (int i = 0; i < changed; ++i) {
     packs->contacts[place / HAPI_LANES].drive[i][place % HAPI_LANES] = row[i].drive;
   }
-}
-
-/* 1/kg, exactly as in the rows: from the largest part of the direction. */
-static double inverse_mass(const double j[6], const double b[6])
-{
-  int k = fabs(j[0]) > fabs(j[1]) ? 0 : 1;
-  k = fabs(j[k]) > fabs(j[2]) ? k : 2;
-  return b[k] / j[k];
 }
 
 /* The arm along the directions d of three rows, from their moments arm x d. Of left-handed
@@ -109,10 +101,10 @@ static void bodies_fill(const hapi_packs *packs, hapi_pack *pack, uint32_t lane,
   double right[3];
   hapi_v3_cross(row[1].ja, row[2].ja, right);
   double sign = hapi_v3_dot(row[0].ja, right) < 0.0 ? -1.0 : 1.0;
-  pack->mass_a[lane] = inverse_mass(row->ja, row->ba);
+  pack->mass_a[lane] = hapi_row_inverse_mass(row->ja, row->ba);
   turn_fill(packs->inverse_inertia[row->a], pack->turn_a, lane);
   if (pack->paired) {
-    pack->mass_b[lane] = inverse_mass(row->jb, row->bb);
+    pack->mass_b[lane] = hapi_row_inverse_mass(row->jb, row->bb);
     turn_fill(packs->inverse_inertia[row->b], pack->turn_b, lane);
     arm_find(row, false, arm);
     arm_find(row, true, apart);
@@ -130,18 +122,6 @@ static void bodies_fill(const hapi_packs *packs, hapi_pack *pack, uint32_t lane,
 
 /* ---- units, colors and their order ---- */
 
-/* Exactly: of a patch they are, and of what was made at the same time. */
-static bool same_directions(const hapi_row *row, const hapi_row *other)
-{
-  bool same = true;
-  for (int i = 0; i < 3; ++i) {
-    const double *j = row[i].ja;
-    const double *k = other[i].ja;
-    same = same && j[0] == k[0] && j[1] == k[1] && j[2] == k[2];
-  }
-  return same;
-}
-
 static void units_find(hapi_packs *packs, const hapi_row *rows, uint32_t row_count)
 {
   uint32_t most = HAPI_LANES * packs->contact_capacity;
@@ -155,9 +135,9 @@ static void units_find(hapi_packs *packs, const hapi_row *rows, uint32_t row_cou
     const hapi_row *last =
         packs->packable_count > 0 ? &rows[packs->packables[packs->packable_count - 1].row] : NULL;
     if (last == NULL || last + 3 != row || last->a != row->a || last->b != row->b ||
-        packs->units[units - 1].count == HAPI_PACK_CONTACTS || !same_directions(last, row)) {
+        packs->units[units - 1].count == HAPI_PACK_CONTACTS || !hapi_same_directions(last, row)) {
       packs->units[units++] =
-          (hapi_pack_unit){.first = packs->packable_count, .paired = row->paired};
+          (hapi_pack_unit){.first = packs->packable_count, .paired = hapi_row_moves_b(row)};
     }
     packs->packables[packs->packable_count++] = (hapi_packable){
         .row = i, .a = row->a, .b = row->b, .place = HAPI_NO_PLACE, .unit = units - 1};
@@ -405,11 +385,11 @@ static bool unit_holds(const hapi_packs *packs, const hapi_row *rows, const hapi
     const hapi_packable *packable = &first[i];
     const hapi_row *row = &rows[packable->row];
     if (packable->place == HAPI_NO_PLACE || !is_packable(row) || row->a != packable->a ||
-        row->b != packable->b || row->paired != unit->paired) {
+        row->b != packable->b || hapi_row_moves_b(row) != unit->paired) {
       return false;
     }
     bool made = row->made != packable->made || rows[first->row].made != first->made;
-    if (made && !same_directions(&rows[first->row], row)) {
+    if (made && !hapi_same_directions(&rows[first->row], row)) {
       return false;
     }
   }

@@ -30,6 +30,7 @@ typedef struct hapi_pack_contact {
   double inverse[3][HAPI_LANES];
   double response[3][HAPI_LANES];
   double mu[2][HAPI_LANES];
+  double load[HAPI_LANES];        /* N s, that frictions go by at least */
   double coupling[3][HAPI_LANES]; /* of rows 0 and 1, 0 and 2, 1 and 2 */
 } hapi_pack_contact;
 

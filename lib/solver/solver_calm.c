@@ -61,7 +61,7 @@ static void find_islands(const hapi_solver *solver, rays *out)
     hapi_loose_rows at = hapi_loose_at(solver, i);
     for (uint32_t k = at.first; k < at.end; ++k) {
       const hapi_row *row = &solver->rows[k];
-      if (row->inverse != 0.0 && row->paired && hapi_row_moves_a(row)) {
+      if (row->inverse != 0.0 && hapi_row_moves_b(row) && hapi_row_moves_a(row)) {
         hapi_unite(out->root, row->a, row->b);
       }
     }
@@ -80,7 +80,7 @@ static bool is_calm(const ray *r)
 static void row_measure(const hapi_solver *solver, const hapi_row *row, ray *io)
 {
   double without = row->drive - hapi_dot6(row->ja, solver->free[row->a]);
-  without -= row->paired ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
+  without -= hapi_row_moves_b(row) ? hapi_dot6(row->jb, solver->free[row->b]) : 0.0;
   double a = row->impulse * without;
   double b = a - row->impulse * hapi_row_error(solver, row);
   /* rays_measure has cleared it, for every island */

@@ -646,6 +646,7 @@ void hapi_contact_step(hapi_tick *tick)
     }
     hapi_push_out_stop(&tick->rows);
     rows_solve(&tick->rows, &tick->sample);
+    hapi_push_out_end(&tick->rows);
     bodies_take_velocities(&tick->bodies, &tick->rows, tick->facts.wishes);
   }
   rows_note_unsolved(&tick->rows);

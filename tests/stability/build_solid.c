@@ -151,9 +151,12 @@ void build_row_ends(world *w, const case_row *row)
 /* 0.3 mm narrower than the cube, which is pressed down between them. */
 void build_walls(world *w, const case_row *row)
 {
-  (void)add_block(w, AT(0.02, 0.2, 0.2), AT(-HALF - 0.01 + 1.5e-4, 0.0, 0.0));
-  (void)add_block(w, AT(0.02, 0.2, 0.2), AT(HALF + 0.01 - 1.5e-4, 0.0, 0.0));
-  (void)add_cube(w, row->mass, EDGE, AT(0.0, 0.0, 0.0));
+  double half = row->n * HALF;
+  (void)add_block(w, AT(0.02, 0.2, 0.2), AT(-half - 0.01 + 1.5e-4, 0.0, 0.0));
+  (void)add_block(w, AT(0.02, 0.2, 0.2), AT(half + 0.01 - 1.5e-4, 0.0, 0.0));
+  for (int i = 0; i < row->n; ++i) {
+    (void)add_cube(w, row->mass, EDGE, AT(EDGE * i - half + HALF, 0.0, 0.0));
+  }
   set_gravity(w, 0.0);
   press_at(w, 0.01, 0.0, HALF, 0.02);
 }
