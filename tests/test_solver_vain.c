@@ -104,5 +104,5 @@ TEST(a_tower_that_slides_is_solved)
   }
   rig_destroy(&r);
   printf("# %d ticks used their budget up, %d after damped rounds\n", used_up, damped);
-  CHECK(used_up < 15 && damped > 0);
+  CHECK(used_up < 8 && damped > 0);
 }
