@@ -140,7 +140,8 @@ static void round_ask(double (*out)[6], uint32_t counts[3])
   }
 }
 
-static void check_alike(double tilt)
+/* turned: since the rows were made, so that the bodies answer a little otherwise now. */
+static void check_alike(double tilt, bool turned)
 {
   double together[BODIES][6] = {{0.0}};
   double one_by_one[BODIES][6] = {{0.0}};
@@ -148,9 +149,12 @@ static void check_alike(double tilt)
   double apart = 0.0;
   double size = 0.0;
   problem_make(tilt);
+  p.inverse_inertia[2][4] *= turned ? 1.001 : 1.0;
   round_ask(together, counts);
   CHECK(counts[HAPI_ROW_FREE] > 8 && counts[HAPI_ROW_TIED] > 4 && counts[HAPI_ROW_FIXED] > 4);
-  p.solver.packs.work = NULL;
+  for (uint32_t i = 0; i < p.solver.row_count; ++i) {
+    p.rows[i].triple = 0;
+  }
   round_ask(one_by_one, counts);
   for (uint32_t i = 1; i <= BOXES; ++i) {
     for (int k = 0; k < 6; ++k) {
@@ -163,13 +167,14 @@ static void check_alike(double tilt)
 
 TEST(contacts_of_a_pair_ask_for_what_their_rows_do)
 {
-  check_alike(0.0);
+  check_alike(0.0, false);
+  check_alike(0.0, true);
 }
 
 /* A body that turns a little keeps the rows of some of its contacts. */
 TEST(so_do_contacts_that_were_made_one_after_the_other)
 {
-  check_alike(1e-5);
+  check_alike(1e-5, false);
 }
 
 /* All boxes fall on each other, and stick. */

@@ -380,12 +380,6 @@ static void add_sliding(hapi_island *is, uint32_t index)
   }
 }
 
-/* A contact whose bodies answer by their mass. */
-static bool goes_with_pair(const hapi_island *is, const hapi_row *row)
-{
-  return row->triple == HAPI_TRIPLE_BY_MASS && is->solver->packs.work != NULL;
-}
-
 /* Of a normal: it and its frictions. */
 static void add_contact(hapi_island *is, uint32_t normal, hapi_pair_sum *io)
 {
@@ -424,7 +418,7 @@ static void matrix_assemble(hapi_island *is)
   hapi_pair_sum pair = {NULL};
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     const hapi_row *row = &rows[i];
-    if (goes_with_pair(is, row)) {
+    if (row->triple == HAPI_TRIPLE_BY_MASS) {
       add_contact(is, i, &pair);
       i += 2; /* its frictions */
     } else if (row->state == HAPI_ROW_SLIDING) {

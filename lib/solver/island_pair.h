@@ -3,14 +3,14 @@
 #ifndef HAPODE_SOLVER_ISLAND_PAIR_H
 #define HAPODE_SOLVER_ISLAND_PAIR_H
 
-/* Inner part of island.c: how the contacts of a pair of bodies that answer by their mass enter the
- * matrix together. The rows of a contact, j = (d, arm x d), are those of one point, b's opposite to
- * a's, and the way from b's centre to a's is the same for all of them. With S the sum of gain j j^T
- * of a's parts, and E the moments about b's centre of what a has about its own, the blocks are
+/* Inner part of island.c: how the contacts of a pair of bodies enter the matrix together. Their
+ * rows, j = (d, arm x d), are those of one point, b's opposite to a's, and the way from b's centre
+ * to a's is the same for all of them. So with E the moments about b's centre of what a has about
+ * its own, j_b = -E j_a, and the four blocks are
  *
- *   M_a^-1 S   -M_a^-1 S E^T   -M_b^-1 E S   M_b^-1 E S E^T
+ *   A   -A E^T   B   -B E^T   with   A = sum of gain b_a j_a^T,  B = sum of gain b_b j_a^T
  *
- * so that a row is one product in place of four. */
+ * so that a row is two products in place of four. */
 
 #include <string.h>
 
@@ -19,23 +19,11 @@
 
 typedef struct hapi_pair_sum {
   const hapi_row *first; /* normal of a contact; NULL: none yet */
-  double gains[6][6];    /* S */
-  double asked[6];       /* sum of gain e j */
+  double of_a[6][6];     /* A, this and the next row by row */
+  double of_b[6][6];
+  double asked_a[6]; /* sum of gain e b_a */
+  double asked_b[6];
 } hapi_pair_sum;
-
-/* One side of it. */
-typedef struct hapi_pair_body {
-  uint16_t local;
-  double inverse_mass;           /* 1/kg */
-  const double *inverse_inertia; /* world */
-} hapi_pair_body;
-
-static inline void hapi_pair_begin(const hapi_row *normal, hapi_pair_sum *out)
-{
-  out->first = normal;
-  memset(out->gains, 0, sizeof out->gains);
-  memset(out->asked, 0, sizeof out->asked);
-}
 
 /* What drives a row: the row whose error it is, which it may be itself. */
 typedef struct hapi_pair_drive {
@@ -44,27 +32,48 @@ typedef struct hapi_pair_drive {
   double error;
 } hapi_pair_drive;
 
+static inline void hapi_pair_begin(const hapi_row *normal, hapi_pair_sum *out)
+{
+  memset(out, 0, sizeof *out);
+  out->first = normal;
+}
+
+/* io += b_0 from_0^T + b_1 from_1^T + b_2 from_2^T */
+static inline void hapi_pair_products(const double *const b[3], hapi_two from[3][3],
+                                      double io[6][6])
+{
+  for (int r = 0; r < 6; ++r) {
+    const hapi_two share[3] = {hapi_two_all(b[0][r]), hapi_two_all(b[1][r]), hapi_two_all(b[2][r])};
+    for (int k = 0; k < 3; ++k) {
+      hapi_two sum = hapi_two_load(io[r] + 2 * k);
+      sum = hapi_two_madd(sum, share[0], from[0][k]);
+      sum = hapi_two_madd(sum, share[1], from[1][k]);
+      hapi_two_store(io[r] + 2 * k, hapi_two_madd(sum, share[2], from[2][k]));
+    }
+  }
+}
+
 /* The three rows of a contact, from its normal on. */
 static inline void hapi_pair_add(hapi_pair_sum *io, const hapi_row *normal,
                                  const hapi_pair_drive by[3])
 {
+  const bool both = hapi_row_moves_b(normal);
+  const double *const of_a[3] = {normal[0].ba, normal[1].ba, normal[2].ba};
+  const double *const of_b[3] = {normal[0].bb, normal[1].bb, normal[2].bb};
   hapi_two from[3][3];
   for (int i = 0; i < 3; ++i) {
     const hapi_two gain = hapi_two_all(by[i].gain);
     for (int k = 0; k < 3; ++k) {
       from[i][k] = hapi_two_mul(gain, hapi_two_load(by[i].from->ja + 2 * k));
     }
-    hapi_madd6(io->asked, by[i].gain * by[i].error, normal[i].ja);
-  }
-  for (int r = 0; r < 6; ++r) {
-    double *row = io->gains[r];
-    for (int k = 0; k < 3; ++k) {
-      hapi_two sum = hapi_two_load(row + 2 * k);
-      for (int i = 0; i < 3; ++i) {
-        sum = hapi_two_madd(sum, hapi_two_all(normal[i].ja[r]), from[i][k]);
-      }
-      hapi_two_store(row + 2 * k, sum);
+    hapi_madd6(io->asked_a, by[i].gain * by[i].error, of_a[i]);
+    if (both) {
+      hapi_madd6(io->asked_b, by[i].gain * by[i].error, of_b[i]);
     }
+  }
+  hapi_pair_products(of_a, from, io->of_a);
+  if (both) {
+    hapi_pair_products(of_b, from, io->of_b);
   }
 }
 
@@ -82,81 +91,40 @@ static inline void hapi_pair_way(const hapi_row *normal, double out[3])
   }
 }
 
-/* E in, out is not in */
-static inline void hapi_pair_turn_rows(const double way[3], const double in[6][6], double out[6][6])
-{
-  memcpy(out, in, 36 * sizeof(double));
-  for (int i = 0; i < 3; ++i) {
-    hapi_madd6(out[3 + i], way[(i + 1) % 3], in[(i + 2) % 3]);
-    hapi_madd6(out[3 + i], -way[(i + 2) % 3], in[(i + 1) % 3]);
-  }
-}
-
-/* io E^T */
-static inline void hapi_pair_turn_columns(const double way[3], double io[6][6])
+/* block += in, or with a way block -= in E^T */
+static inline void hapi_pair_put(const double in[6][6], const double *way, double block[36])
 {
   for (int i = 0; i < 6; ++i) {
-    double turned[3];
-    hapi_v3_cross(way, io[i], turned);
-    hapi_v3_add(io[i] + 3, turned, io[i] + 3);
-  }
-}
-
-/* block += sign M^-1 in */
-static inline void hapi_pair_respond(const hapi_pair_body *body, double sign, const double in[6][6],
-                                     double block[36])
-{
-  for (int i = 0; i < 3; ++i) {
-    hapi_madd6(block + 6 * i, sign * body->inverse_mass, in[i]);
-    for (int k = 0; k < 3; ++k) {
-      hapi_madd6(block + 18 + 6 * i, sign * body->inverse_inertia[3 * i + k], in[3 + k]);
+    hapi_madd6(block + 6 * i, way != NULL ? -1.0 : 1.0, in[i]);
+    if (way != NULL) {
+      double turned[3];
+      hapi_v3_cross(way, in[i], turned);
+      hapi_v3_sub(block + 6 * i + 3, turned, block + 6 * i + 3);
     }
   }
-}
-
-/* dv += sign M^-1 asked */
-static inline void hapi_pair_ask(const hapi_pair_body *body, double sign, const double asked[6],
-                                 double dv[6])
-{
-  double turn[3];
-  hapi_v3_madd(dv, sign * body->inverse_mass, asked, dv);
-  hapi_m3_apply(body->inverse_inertia, asked + 3, turn);
-  hapi_v3_madd(dv + 3, sign, turn, dv + 3);
 }
 
 /* The sum to the blocks and to the right side. */
 static inline void hapi_pair_enter(hapi_island *is, hapi_pair_sum *io)
 {
   const hapi_row *row = io->first;
-  const double(*inverse_inertia)[9] = (const double(*)[9])is->solver->packs.inverse_inertia;
+  double way[3];
   if (row == NULL) {
     return;
   }
-  const hapi_pair_body a = {is->local[row->a], hapi_row_inverse_mass(row->ja, row->ba),
-                            inverse_inertia[row->a]};
-  hapi_pair_respond(&a, 1.0, (const double(*)[6])io->gains,
-                    is->blocks[is->block[a.local][a.local]]);
-  hapi_pair_ask(&a, 1.0, io->asked, is->dv[a.local]);
   io->first = NULL;
+  const uint16_t a = is->local[row->a];
+  hapi_pair_put((const double(*)[6])io->of_a, NULL, is->blocks[is->block[a][a]]);
+  hapi_madd6(is->dv[a], 1.0, io->asked_a);
   if (!hapi_row_moves_b(row)) {
     return;
   }
-  const hapi_pair_body b = {is->local[row->b], hapi_row_inverse_mass(row->jb, row->bb),
-                            inverse_inertia[row->b]};
-  double way[3];
-  double of_b[6][6];
-  double moment[3];
+  const uint16_t b = is->local[row->b];
   hapi_pair_way(row, way);
-  hapi_pair_turn_rows(way, (const double(*)[6])io->gains, of_b);
-  hapi_pair_turn_columns(way, io->gains);
-  hapi_pair_respond(&a, -1.0, (const double(*)[6])io->gains,
-                    is->blocks[is->block[a.local][b.local]]);
-  hapi_pair_respond(&b, -1.0, (const double(*)[6])of_b, is->blocks[is->block[b.local][a.local]]);
-  hapi_pair_turn_columns(way, of_b);
-  hapi_pair_respond(&b, 1.0, (const double(*)[6])of_b, is->blocks[is->block[b.local][b.local]]);
-  hapi_v3_cross(way, io->asked, moment);
-  hapi_v3_add(io->asked + 3, moment, io->asked + 3);
-  hapi_pair_ask(&b, -1.0, io->asked, is->dv[b.local]);
+  hapi_pair_put((const double(*)[6])io->of_b, NULL, is->blocks[is->block[b][a]]);
+  hapi_madd6(is->dv[b], 1.0, io->asked_b);
+  hapi_pair_put((const double(*)[6])io->of_a, way, is->blocks[is->block[a][b]]);
+  hapi_pair_put((const double(*)[6])io->of_b, way, is->blocks[is->block[b][b]]);
 }
 
 #endif

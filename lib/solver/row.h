@@ -3,7 +3,6 @@
 #ifndef HAPODE_SOLVER_ROW_H
 #define HAPODE_SOLVER_ROW_H
 
-#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -60,15 +59,6 @@ static inline bool hapi_row_moves_a(const hapi_row *row)
 static inline bool hapi_row_moves_b(const hapi_row *row)
 {
   return (row->moves & HAPI_MOVES_B) != 0;
-}
-
-/* 1/kg, of a body that answers by its mass: exactly as in the row, from the largest part of its
- * direction. */
-static inline double hapi_row_inverse_mass(const double j[6], const double b[6])
-{
-  int k = fabs(j[0]) > fabs(j[1]) ? 0 : 1;
-  k = fabs(j[k]) > fabs(j[2]) ? k : 2;
-  return b[k] / j[k];
 }
 
 /* Of two contacts of the same bodies, exactly: of a patch they are, and of what was made at the
