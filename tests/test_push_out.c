@@ -97,6 +97,25 @@ TEST(each_solve_goes_on_from_its_own_impulses)
   rows_hold(&r, 50.0, 60.0, 70.0);
 }
 
+/* A contact that is pushed out. Only while the second solve runs, as its rows may be kept. */
+TEST(frictions_of_a_second_solve_have_the_load_of_the_first)
+{
+  rows_rig r;
+  rows_make(&r);
+  r.of[0].normal = -1; /* those of the others are 0 */
+  r.rows.contact_begin = 0;
+  r.lifted[0] = (hapi_row_lifted){.row = 0, .which = HAPI_NO_PACKABLE};
+  r.rows.lifted_count = 1;
+  tick_of_two(&r, 3000);
+  CHECK(r.of[1].hi == 0.0 && r.of[2].hi == 0.0); /* it went on from the first one's impulses */
+  hapi_push_out_end(&r.rows);
+  tick_of_two(&r, 3000);
+  CHECK_NEAR(r.of[1].hi, 5.0, 0.0);
+  CHECK_NEAR(r.of[2].hi, 5.0, 0.0);
+  hapi_push_out_end(&r.rows);
+  CHECK(r.of[1].hi == 0.0 && r.of[2].hi == 0.0);
+}
+
 TEST(where_that_is_cheap_they_go_on_from_each_other)
 {
   rows_rig r;

@@ -16,7 +16,7 @@ void hapi_push_out_begin(hapi_rows *rows);
 bool hapi_push_out_acts(hapi_rows *rows);
 /* Before the second one, when the bodies are where the first one moved them. */
 void hapi_push_out_stop(hapi_rows *rows);
-/* After it. */
+/* After it: what was set for it alone is taken back. */
 void hapi_push_out_end(hapi_rows *rows);
 
 #endif
