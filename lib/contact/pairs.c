@@ -38,8 +38,9 @@ struct hapi_pairs {
   uint32_t capacity; /* contacts */
   _Atomic uint64_t *left_out;
   hapi_kept kept;
-  uint64_t numbers; /* of contacts, that were given */
-  pass_pair *pass;  /* as the pairs that are kept */
+  uint64_t numbers;  /* of contacts, that were given */
+  uint64_t surfaces; /* of the near message: the same pairs in the same order have the same */
+  pass_pair *pass;   /* as the pairs that are kept */
   pair_group *group;
 };
 
@@ -392,7 +393,7 @@ static bool keys_fill(hapi_pairs *pairs, hapi_patches *out)
   uint64_t wanted = 0;
   out->contact_count = 0;
   out->surface_count = 0;
-  out->contents = hapi_hash_word(HAPI_HASH_BEGIN, pairs->places->near->model_number);
+  out->contents = pairs->surfaces;
   for (uint32_t i = 0; i < pairs->kept.count; ++i) {
     key_fill(pairs, i, &wanted, out);
   }
@@ -449,9 +450,24 @@ static void leave_out_farthest(hapi_pairs *pairs)
 
 /* ---- a pass ---- */
 
+/* One surface after the other is mostly the same. */
+static uint64_t surfaces_of(hapi_near *near)
+{
+  const hapi_near_pair *pairs = hapi_near_pairs(near);
+  uint64_t hash = HAPI_HASH_BEGIN;
+  for (uint32_t i = 0; i < near->pair_count; ++i) {
+    const hapi_surface *surface = &pairs[i].surface;
+    bool again = i > 0 && memcmp(surface, &pairs[i - 1].surface, sizeof *surface) == 0;
+    hash = hapi_hash_word(hash, pairs[i].key);
+    hash = hapi_hash_word(hash, again ? 0 : hapi_surface_hash(surface));
+  }
+  return hash;
+}
+
 void hapi_pairs_take_near(hapi_pairs *pairs)
 {
   hapi_kept_take_near(&pairs->kept, pairs->places);
+  pairs->surfaces = surfaces_of(pairs->places->near);
 }
 
 void hapi_pairs_find(hapi_pairs *pairs, hapi_patches *out)

@@ -2,11 +2,9 @@
  * SPDX-License-Identifier: MIT */
 #include "local/contact_memory.h"
 
-#include <assert.h>
 #include <string.h>
 
 #include "base/assert.h"
-#include "base/hash.h"
 #include "base/vec.h"
 
 /* A contact that goes on keeps what it had, also where it comes in another place of the message as
@@ -58,18 +56,6 @@ static uint32_t first_of(const hapi_body_contacts *contacts, uint64_t key, uint3
     }
   }
   return count;
-}
-
-static uint64_t surface_hash(const hapi_surface *surface)
-{
-  uint64_t words[sizeof *surface / sizeof(uint64_t)];
-  uint64_t hash = HAPI_HASH_BEGIN;
-  static_assert(sizeof words == sizeof *surface, "all of it");
-  memcpy(words, surface, sizeof words);
-  for (size_t i = 0; i < sizeof words / sizeof words[0]; ++i) {
-    hash = hapi_hash_word(hash, words[i]);
-  }
-  return hash;
 }
 
 static bool is_same_contact(const hapi_contact_memory *memory, const hapi_patch_contact *in)
@@ -161,7 +147,7 @@ static inline bool contents_are_same(const hapi_body_contacts *contacts, hapi_pa
   for (uint32_t i = 0; i < patches->contact_count; ++i) {
     const hapi_contact_memory *memory = &contacts->memory[i];
     if (memory->number != in[i].number || memory->kept.surface != in[i].surface ||
-        memory->surface != surface_hash(&hapi_patches_surfaces(patches)[in[i].surface])) {
+        memory->surface != hapi_surface_hash(&hapi_patches_surfaces(patches)[in[i].surface])) {
       return false;
     }
   }
@@ -209,7 +195,7 @@ static void memories_fill(hapi_body_contacts *contacts, hapi_patches *patches, u
   bool ignored;
   for (uint32_t i = first; aside > 0 && i < count; ++i) {
     if (i == first || in[i].surface != in[i - 1].surface) {
-      surface = surface_hash(&surfaces[in[i].surface]);
+      surface = hapi_surface_hash(&surfaces[in[i].surface]);
     }
     if (contacts->memory[i].number == 0 && memory_come_back(contacts, i, &in[i], rows, aside)) {
       memory_go_on(&contacts->memory[i], &in[i], surface, &ignored);
@@ -218,7 +204,7 @@ static void memories_fill(hapi_body_contacts *contacts, hapi_patches *patches, u
   /* Then the new ones: none is to take the impulses of what has come back. */
   for (uint32_t i = first; i < count; ++i) {
     if (contacts->memory[i].number == 0) {
-      memory_begin(contacts, i, &in[i], surface_hash(&surfaces[in[i].surface]), aside);
+      memory_begin(contacts, i, &in[i], hapi_surface_hash(&surfaces[in[i].surface]), aside);
       pair_begin(contacts, in, i, count);
     }
   }
@@ -248,7 +234,7 @@ void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patche
   for (uint32_t i = 0; i < before; ++i) {
     hapi_contact_memory *memory = &contacts->memory[i];
     if (i < count && (i == 0 || in[i].surface != in[i - 1].surface)) {
-      surface = surface_hash(&surfaces[in[i].surface]);
+      surface = hapi_surface_hash(&surfaces[in[i].surface]);
     }
     if (i < count && is_same_contact(memory, &in[i])) {
       memory_go_on(memory, &in[i], surface, &changed);

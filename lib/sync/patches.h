@@ -5,6 +5,10 @@
 
 /* contact -> haptic: contacts between bodies (model CONTACT). */
 
+#include <assert.h>
+#include <string.h>
+
+#include "base/hash.h"
 #include "proximity/patch.h"
 #include "sync/message.h"
 
@@ -24,6 +28,18 @@ typedef struct hapi_surface {
   double motion[3];    /* m/s along friction 1, friction 2, normal */
   double slip[2];      /* m/(N s) */
 } hapi_surface;
+
+static inline uint64_t hapi_surface_hash(const hapi_surface *surface)
+{
+  uint64_t words[sizeof *surface / sizeof(uint64_t)];
+  uint64_t hash = HAPI_HASH_BEGIN;
+  static_assert(sizeof words == sizeof *surface, "all of it");
+  memcpy(words, surface, sizeof words);
+  for (size_t i = 0; i < sizeof words / sizeof words[0]; ++i) {
+    hash = hapi_hash_word(hash, words[i]);
+  }
+  return hash;
+}
 
 enum {
   HAPI_SURFACE_APPROX1_1 = 1,
