@@ -175,9 +175,10 @@ static void equations_solve(double *a, uint32_t n, double *x)
     const double swapped = x[k];
     x[k] = x[best];
     x[best] = swapped;
+    const double inverse = 1.0 / a[(size_t)k * n + k];
     for (uint32_t i = k + 1; i < n; ++i) {
-      const double share = a[(size_t)i * n + k] / a[(size_t)k * n + k];
-      for (uint32_t c = k; c < n; ++c) {
+      const double share = a[(size_t)i * n + k] * inverse;
+      for (uint32_t c = k + 1; c < n; ++c) {
         a[(size_t)i * n + c] -= share * a[(size_t)k * n + c];
       }
       x[i] -= share * x[k];

@@ -84,17 +84,19 @@ static bool bounded_find(hapi_island *is, hapi_bounded *out)
   return joints > 0 && out->count > 0;
 }
 
+/* What row k takes from the error of row i, i takes from that of k. */
 static void answers_find(hapi_island *is, hapi_bounded *b)
 {
-  for (uint32_t k = 0; k < b->count; ++k) {
-    double *answers = b->answers + (size_t)k * b->count;
+  const uint32_t n = b->count;
+  for (uint32_t k = 0; k < n; ++k) {
     memset(is->dv, 0, is->count * sizeof *is->dv);
     answer_push(is, &b->rows[b->row[k]], 1.0);
     hapi_island_substitute(is);
-    for (uint32_t i = 0; i < b->count; ++i) {
-      answers[i] = answer_along(is, &b->rows[b->row[i]]);
+    for (uint32_t i = 0; i <= k; ++i) {
+      const double answer = answer_along(is, &b->rows[b->row[i]]);
+      b->answers[(size_t)k * n + i] = b->answers[(size_t)i * n + k] = answer;
     }
-    answers[k] += b->rows[b->row[k]].softness;
+    b->answers[(size_t)k * n + k] += b->rows[b->row[k]].softness;
   }
 }
 
