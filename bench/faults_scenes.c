@@ -205,6 +205,8 @@ static void flying_hand(double t, double x[3], double v[3])
 
 /* ---- seams ---- */
 
+#define SEAM_STEP 5e-6 /* m */
+
 /* Two boxes side by side; the reference has one. */
 static void seam_build(faults_world *w)
 {
@@ -214,6 +216,17 @@ static void seam_build(faults_world *w)
   }
   faults_box(w, NULL, (double[3]){0.05, 0.1, 0.05}, (double[3]){-0.025, 0.0, -0.025});
   faults_box(w, NULL, (double[3]){0.05, 0.1, 0.05}, (double[3]){0.025, 0.0, -0.025});
+}
+
+/* The second one is lower, by what no hand tells. */
+static void seam_step_build(faults_world *w)
+{
+  if (w->is_reference) {
+    seam_build(w);
+    return;
+  }
+  faults_box(w, NULL, (double[3]){0.05, 0.1, 0.05}, (double[3]){-0.025, 0.0, -0.025});
+  faults_box(w, NULL, (double[3]){0.05, 0.1, 0.05}, (double[3]){0.025, 0.0, -0.025 - SEAM_STEP});
 }
 
 /* The same as one body on a floor. */
@@ -677,6 +690,10 @@ const faults_scene faults_table[] = {
     {3, "seam_body", seam_body_build, FINGER(&seam_path), 1.0, WITHIN(0.02)},
     {3, "seam_pair", seam_pair_build, FINGER(&seam_path), 1.0, WITHIN(0.02)},
     {3, "seam_rub", seam_build, FINGER(&seam_path, .friction = 0.5), 1.0, WITHIN(0.02)},
+    {3, "seam_step", seam_step_build, FINGER(&seam_path), 1.0, WITHIN(0.02)},
+    {3, "seam_step_tool", seam_step_build, FINGER(&seam_path, .friction = 0.5, .cube_tool = true),
+     1.0, WITHIN(0.02)},
+    {3, "seam_step_rub", seam_step_build, FINGER(&seam_path, .friction = 0.5), 1.0, WITHIN(0.02)},
     {3, "seam_tool", seam_build, FINGER(&seam_path, .cube_tool = true), 1.0, WITHIN(0.02)},
     {3, "seam_tool_rub", seam_build, FINGER(&seam_path, .friction = 0.5, .cube_tool = true), 1.0,
      WITHIN(0.02)},

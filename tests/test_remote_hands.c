@@ -47,7 +47,7 @@ static void cubes_join(hands_rig *r, int which)
   hap_pointer_def_init(&hand, sizeof hand);
   hand.radius = 0.01;
   hand.stiffness = 1000.0;
-  hand.friction = 0.5;
+  hand.friction = 0.3; /* the floor holds the cubes: else rounding would say when one slides */
   rig_join(r, which, &hand);
 }
 

@@ -161,6 +161,94 @@ TEST(a_step_is_no_seam)
   cw_close(&w);
 }
 
+/* One that is lower or higher by less than what is a step, a hundredth of the radius: each pushes
+ * where it is the deeper one, with the edge of the higher one where that is. */
+TEST(one_that_is_a_little_higher_pushes_once)
+{
+  static const double steps[] = {1e-6, 1e-5, 4.5e-5, -1e-6, -1e-5, -4.5e-5}; /* m, up at x = 0 */
+  for (size_t n = 0; n < sizeof steps / sizeof steps[0]; ++n) {
+    contact_world w;
+    double worst = 0.0;
+    open_world(&w, 0.0);
+    (void)add_block(&w, -0.05, -0.05);
+    (void)add_block(&w, 0.05, -0.05 + steps[n]);
+    cw_start(&w, -0.01, 0.0, RADIUS - DEEP);
+    cw_run(&w, 100);
+    cw_move_hand(&w, SPEED, 0.0, 0.0);
+    for (int i = 0; i < 400; ++i) {
+      cw_tick(&w);
+      double x = w.hand_at[0];
+      double left = hypot(fmax(x, 0.0), RADIUS - DEEP); /* from its middle to the two boxes */
+      double right = hypot(fmin(x, 0.0), RADIUS - DEEP - steps[n]);
+      double off = cw_norm(w.force) - K * (RADIUS - fmin(left, right));
+      worst = fmax(worst, fabs(off));
+    }
+    CHECK_SAY(worst < 1e-6, "a step of %g m: %g N off", steps[n], worst);
+    CHECK(w.hand_at[0] > 0.005);
+    cw_close(&w);
+  }
+}
+
+/* Over the corner where four meet that are not as high: two of them meet there alone. Also so deep
+ * that an edge points aside. */
+TEST(four_that_are_not_as_high_push_once)
+{
+  static const double heights[4] = {-1.2e-5, -5e-6, 1.8e-5, -3e-6};
+  static const double depths[] = {0.0005, 0.0013, 0.002, 0.0035, 0.0044};
+  for (size_t n = 0; n < sizeof depths / sizeof depths[0]; ++n) {
+    contact_world w;
+    double worst = 0.0;
+    open_world(&w, 0.0);
+    for (int i = 0; i < 4; ++i) {
+      dGeomID block = add_block(&w, i < 2 ? -0.05 : 0.05, -0.05 + heights[i]);
+      dGeomSetPosition(block, i < 2 ? -0.05 : 0.05, i % 2 == 0 ? 0.05 : -0.05, -0.05 + heights[i]);
+    }
+    cw_start(&w, -0.004, 0.0016, RADIUS - depths[n]);
+    cw_run(&w, 100);
+    cw_move_hand(&w, SPEED, -0.4 * SPEED, 0.0);
+    for (int i = 0; i < 160; ++i) {
+      cw_tick(&w);
+      double deepest = 0.0;
+      for (int k = 0; k < 4; ++k) {
+        double x = k < 2 ? fmax(w.hand_at[0], 0.0) : fmin(w.hand_at[0], 0.0);
+        double y = k % 2 == 0 ? fmin(w.hand_at[1], 0.0) : fmax(w.hand_at[1], 0.0);
+        double way = hypot(hypot(x, y), w.hand_at[2] - heights[k]);
+        deepest = fmax(deepest, RADIUS - way);
+      }
+      worst = fmax(worst, fabs(cw_norm(w.force) / (K * deepest) - 1.0));
+    }
+    CHECK_SAY(worst < 0.02, "%g m deep: %g off", depths[n], worst);
+    cw_close(&w);
+  }
+}
+
+/* A slit that opens parts one thing into two. In no tick does much come to the force. */
+TEST(a_slit_that_opens_is_felt_little_by_little)
+{
+  const double slow = 1e-3; /* m/s */
+  contact_world w;
+  double before = K * DEEP;
+  double most = 0.0;
+  open_world(&w, 0.0);
+  (void)add_block(&w, -0.05, -0.05);
+  dBodyID right = cw_add_cube(&w, 1.0, 0.1, 0.05, 0.0, -0.05);
+  dBodySetKinematic(right);
+  dBodySetLinearVel(right, slow, 0.0, 0.0);
+  cw_start(&w, -1e-3, 0.0, RADIUS - DEEP);
+  for (int i = 0; i < 300; ++i) {
+    cw_tick(&w);
+    if (i >= 20) { /* it has come in */
+      most = fmax(most, fabs(w.force[2] - before));
+    }
+    before = w.force[2];
+  }
+  double apart = hypot(1e-3 + 0.3 * slow, RADIUS - DEEP);
+  double second = K * (RADIUS - apart) * (RADIUS - DEEP) / apart; /* what its edge gives at last */
+  CHECK_NEAR(w.force[2], K * DEEP + second, 0.02);
+  CHECK_SAY(most < 0.05 * K * DEEP, "%g N in a tick", most);
+  cw_close(&w);
+}
+
 /* Geoms that the loop cannot ask, and models that ask none: a plane for each between two syncs. */
 
 static void add_hull(contact_world *w, box_arrays *box, double x, double z)

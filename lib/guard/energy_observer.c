@@ -273,7 +273,7 @@ static double ramps_give(hapi_guard *guard, const hapi_pointers *pointers,
     hapi_local_contact *c = &touches->of[i];
     const hapi_pointer *p = &pointers->of[c->pointer];
     hapi_ramp *r = &c->ramp;
-    double share = c->hidden ? 0.0 : r->share * p->guard.felt;
+    double share = c->shown * r->share * p->guard.felt;
     double stiffness = hapi_touch_stiffness(c, p);
     double depth = r->depth + (c->feel.special ? c->feel.lift.height : 0.0);
     double strain = hapi_touch_strain(c, depth - r->excess);

@@ -419,7 +419,7 @@ static inline void contact_take(const hapi_tick_facts *facts, const hapi_tool_wo
     motion = hapi_v3_dot(at->j, velocity) - at->w;
   }
   if (!p->rigid && (at->depth + NEAR_FLOOR + NEAR_S * motion > 0.0 || c->feel.sticks)) {
-    at->pointer->coupling.near_stiffness += c->weight * hapi_touch_stiffness(c, p);
+    at->pointer->coupling.near_stiffness += c->shown * c->weight * hapi_touch_stiffness(c, p);
   }
   /* A surface that makes way in a tick that is not small for the pointer is not foretold. */
   bool acts_now = hapi_touch_acts(c, at->depth);
@@ -468,7 +468,7 @@ static void pointer_placed(const hapi_tool_world *tools, hapi_local_contact *c,
   } else {
     hapi_v3_set(at->arm, 0.0, 0.0, 0.0);
     at->depth = c->ramp.depth - c->ramp.excess;
-    at->share = c->ramp.share;
+    at->share = c->shown * c->ramp.share;
   }
 }
 
@@ -502,7 +502,7 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
       placed = c->placed;
       pointer_placed(&touches->tool, c, &at);
     } else {
-      c->hidden = c->is_hidden;
+      c->shown = c->is_hidden ? 0.0 : 1.0;
       placed = !facts->faulted && pointer_place(touches, c, facts->period, &at, sample);
     }
     c->row = HAPI_NO_ROW;
@@ -510,9 +510,9 @@ void hapi_pointer_rows(const hapi_tick_facts *facts, const hapi_pointers *pointe
     if (placed && pointers->grabs) {
       double touches_by = hapi_held_touches_by(at.pointer, c);
       at.share *= touches_by;
-      c->hidden = c->hidden || touches_by <= 0.0;
+      c->shown = touches_by > 0.0 ? c->shown : 0.0;
     }
-    if (!placed || c->hidden) {
+    if (!placed || !(c->shown > 0.0)) {
       hapi_v3_set(c->force, 0.0, 0.0, 0.0);
       c->feel.sticks = false;
       continue;

@@ -12,7 +12,8 @@
 /* A step between two surfaces that is none: of the pointer's radius, and m at most. */
 #define ON_SHARE 0.01
 #define ON_MOST 1e-4
-#define REACH 2.0 /* radii: things that are farther have no part in the touch */
+#define SLIT_MOST 2.0 /* steps: a slit that is wider parts two things; up to there it comes to */
+#define REACH 2.0     /* radii: things that are farther have no part in the touch */
 
 /* m, from a ball to the contact's shape; false: it has none that can be asked. */
 static bool shape_distance(const hapi_touches *touches, const hapi_local_contact *c,
@@ -50,22 +51,84 @@ static double no_step(double radius)
   return fmin(ON_SHARE * radius, ON_MOST);
 }
 
-static bool contact_hides(const hapi_touches *touches, const hapi_local_contact *by,
-                          const hapi_local_contact *c, const hapi_pointer *p,
-                          const hapi_bodies *bodies)
+/* True: the point is surely not on the hider's shape. The nearest point of the shape need not be
+ * computed then. */
+static bool is_far(const hapi_hider *hider, const double point[3])
 {
-  double radius = p->shape.radius;
-  double step = no_step(radius);
+  double way[3];
+  hapi_v3_sub(point, hider->middle, way);
+  return hapi_v3_dot(way, way) > hider->within * hider->within;
+}
+
+/* What the seams of a tick are looked for in. */
+typedef struct seam_search {
+  const hapi_tick_facts *facts;
+  const hapi_pointers *pointers;
+  const hapi_bodies *bodies;
+  const hapi_touches *touches;
+  uint32_t count; /* hiders */
+} seam_search;
+
+static hapi_local_contact *contact_of(const seam_search *s, const hapi_hider *hider)
+{
+  return &s->touches->of[hider->contact];
+}
+
+static double radius_of(const seam_search *s, const hapi_hider *hider)
+{
+  return s->pointers->of[hider->pointer].shape.radius;
+}
+
+/* m, from a point to a hider's shape; HUGE_VAL: it is far. */
+static double hider_distance(const seam_search *s, const hapi_hider *hider, const double point[3])
+{
+  const hapi_local_contact *c = contact_of(s, hider);
+  double distance = HUGE_VAL;
+  if (!is_far(hider, point)) {
+    (void)shape_distance(s->touches, c, hapi_bodies_at(s->bodies, c->body), point, 0.0, &distance);
+  }
+  return distance;
+}
+
+/* 0 where two adjoin, 1 where they do not. */
+static double seam_parts(const seam_search *s, const hapi_hider *a, const hapi_hider *b)
+{
+  double step = no_step(radius_of(s, a));
+  double slit = hider_distance(s, a, contact_of(s, b)->point_now);
+  if (slit > step) {
+    slit = fmin(slit, hider_distance(s, b, contact_of(s, a)->point_now));
+  }
+  return hapi_clamp((slit / step - 1.0) / (SLIT_MOST - 1.0), 0.0, 1.0);
+}
+
+/* The same of two that push, which may also hang together by a third one: two of four boxes whose
+ * corners meet. */
+static double surface_parts(const seam_search *s, const hapi_hider *a, const hapi_hider *b)
+{
+  double parts = seam_parts(s, a, b);
+  bool both = a->depth > 0.0 && b->depth > 0.0;
+  for (uint32_t k = 0; k < s->count && both && parts > 0.0; ++k) {
+    const hapi_hider *by = &s->touches->hiders[k];
+    if (by != a && by != b && by->pointer == a->pointer) {
+      double first = seam_parts(s, a, by);
+      parts = first < parts ? fmin(parts, fmax(first, seam_parts(s, by, b))) : parts;
+    }
+  }
+  return parts;
+}
+
+/* Whether the sphere would not touch the other thing where one alone would hold it. */
+static bool hold_clears(const seam_search *s, const hapi_hider *holds, const hapi_hider *other)
+{
+  const hapi_local_contact *by = contact_of(s, holds);
+  const hapi_local_contact *c = contact_of(s, other);
+  double radius = radius_of(s, other);
   double held[3];
   double distance;
-  if (!shape_distance(touches, by, hapi_bodies_at(bodies, by->body), c->point_now, 0.0,
-                      &distance) ||
-      distance > step) {
-    return false;
-  }
   hapi_v3_madd(by->point_now, radius, by->normal_now, held);
-  return shape_distance(touches, c, hapi_bodies_at(bodies, c->body), held, radius, &distance) &&
-         distance > -step;
+  return shape_distance(s->touches, c, hapi_bodies_at(s->bodies, c->body), held, radius,
+                        &distance) &&
+         distance > -no_step(radius);
 }
 
 static bool friction_held(const hapi_friction *f, const hapi_local_contact *c, uint64_t tick)
@@ -73,18 +136,19 @@ static bool friction_held(const hapi_friction *f, const hapi_local_contact *c, u
   return f->generation == c->generation && f->tick + 1 == tick;
 }
 
-static void friction_hand_over(const hapi_tick_facts *facts, const hapi_pointer *p,
-                               const hapi_bodies *bodies, const hapi_touches *touches,
-                               const hapi_local_contact *from, const hapi_local_contact *to)
+static void friction_hand_over(const seam_search *s, const hapi_local_contact *from,
+                               const hapi_local_contact *to)
 {
+  const hapi_touches *touches = s->touches;
+  const hapi_pointer *p = &s->pointers->of[to->pointer];
   const hapi_friction *held = hapi_friction_of(touches, from);
   hapi_friction *taker = hapi_friction_of(touches, to);
-  const hapi_local_body *body = hapi_bodies_at(bodies, to->body);
-  const hapi_local_body *before = hapi_bodies_at(bodies, from->body);
+  const hapi_local_body *body = hapi_bodies_at(s->bodies, to->body);
+  const hapi_local_body *before = hapi_bodies_at(s->bodies, from->body);
   double stretch[3];
   double foot[3];
-  if (!from->feel.rubs || !to->feel.rubs || !friction_held(held, from, facts->tick) ||
-      friction_held(taker, to, facts->tick)) {
+  if (!from->feel.rubs || !to->feel.rubs || !friction_held(held, from, s->facts->tick) ||
+      friction_held(taker, to, s->facts->tick)) {
     return;
   }
   hapi_v3_scale(held->left, held->now.stretch_body, stretch);
@@ -96,7 +160,7 @@ static void friction_hand_over(const hapi_tick_facts *facts, const hapi_pointer 
   }
   const hapi_rub_place place = {p, body, to->normal_now, foot};
   hapi_friction_foot(p, to->normal_now, to->point_now, foot);
-  hapi_friction_resume(taker, facts->tick, to, &place, stretch, held->left * held->now.turn);
+  hapi_friction_resume(taker, s->facts->tick, to, &place, stretch, held->left * held->now.turn);
 }
 
 /* Of a sphere, near its pointer. */
@@ -134,34 +198,46 @@ static bool goes_before(const hapi_hider *hider, const hapi_local_contact *c, ui
   return hider->depth > c->ramp.depth || (hider->depth == c->ramp.depth && hider->contact < index);
 }
 
-/* True: the point is surely not on the hider's shape. The nearest point of the shape need not be
- * computed then. */
-static bool is_far(const hapi_hider *hider, const double point[3])
+/* shows: 0..1, how much of it is felt still. */
+static void contact_hide(const seam_search *s, const hapi_hider *hidden, const hapi_hider *by,
+                         double shows)
 {
-  double way[3];
-  hapi_v3_sub(point, hider->middle, way);
-  return hapi_v3_dot(way, way) > hider->within * hider->within;
+  hapi_local_contact *c = contact_of(s, hidden);
+  c->shown = fmin(c->shown, shows);
+  if (!(c->shown > 0.0)) {
+    friction_hand_over(s, c, contact_of(s, by));
+  }
+}
+
+/* One against all that are deeper. What one of them hides hides none: of a surface something is
+ * left that pushes. */
+static void seams_of(const seam_search *s, const hapi_hider *own)
+{
+  const hapi_local_contact *c = contact_of(s, own);
+  for (int turned = 0; turned < 2 && c->shown >= 1.0; ++turned) {
+    for (uint32_t k = 0; k < s->count && c->shown > 0.0; ++k) {
+      const hapi_hider *deeper = &s->touches->hiders[k];
+      const hapi_hider *hidden = turned == 0 ? own : deeper;
+      const hapi_hider *by = turned == 0 ? deeper : own;
+      if (deeper->pointer != own->pointer || !goes_before(deeper, c, own->contact)) {
+        continue;
+      }
+      double parts = surface_parts(s, deeper, own);
+      if (parts < 1.0 && hold_clears(s, by, hidden)) {
+        contact_hide(s, hidden, by, parts);
+      }
+    }
+  }
 }
 
 void hapi_seams_hide(const hapi_tick_facts *facts, const hapi_pointers *pointers,
                      const hapi_bodies *bodies, const hapi_touches *touches)
 {
-  uint32_t count = hiders_list(pointers, bodies, touches);
+  const seam_search s = {facts, pointers, bodies, touches, hiders_list(pointers, bodies, touches)};
   for (uint32_t i = 0; i < touches->count; ++i) {
-    hapi_local_contact *c = &touches->of[i];
-    const hapi_pointer *p = &pointers->of[c->pointer];
-    c->hidden = c->is_hidden;
-    if (count == 0 || !is_near(c, pointers)) {
-      continue;
-    }
-    for (uint32_t k = 0; k < count && !c->hidden; ++k) {
-      const hapi_hider *hider = &touches->hiders[k];
-      if (!is_far(hider, c->point_now) && hider->pointer == c->pointer &&
-          goes_before(hider, c, i) &&
-          contact_hides(touches, &touches->of[hider->contact], c, p, bodies)) {
-        c->hidden = true;
-        friction_hand_over(facts, p, bodies, touches, c, &touches->of[hider->contact]);
-      }
-    }
+    touches->of[i].shown = touches->of[i].is_hidden ? 0.0 : 1.0;
+  }
+  for (uint32_t k = 0; k < s.count; ++k) {
+    seams_of(&s, &touches->hiders[k]);
   }
 }

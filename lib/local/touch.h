@@ -95,8 +95,8 @@ typedef struct hapi_local_contact {
   uint32_t row;   /* model CONTACT: in this tick, HAPI_NO_ROW */
   bool seen;      /* rendered at least once */
   bool placed;    /* in this tick, where pointers touch several things */
-  bool hidden;    /* in this tick: the surface goes on behind it, see seams.h */
   bool is_hidden; /* by what the model says; for shapes that the loop does not ask */
+  double shown;   /* 0..1, in this tick: of the rest the surface goes on behind it, see seams.h */
 
   double point_body[3];
   double normal_body[3];

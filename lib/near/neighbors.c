@@ -568,32 +568,74 @@ static bool box_holds(dGeomID geom, const double point[3], double slack)
   return true;
 }
 
-/* by: the deeper one. */
-static bool hit_hides(hapi_nearby *nearby, const hapi_hit *by, const hapi_hit *hit)
+/* Whether the point that was found on the one lies on the other. */
+static bool hit_lies_on(hapi_nearby *nearby, const hapi_hit *hit, dGeomID geom, double step)
 {
-  double radius = hapi_state_pointers(nearby->cycle->state)[hit->pointer].radius;
-  double step = fmin(SEAM_SHARE * radius, SEAM_MOST);
-  double held[3];
   hapi_nearest there;
-  if (by->pointer != hit->pointer || by->tool_count > 0 || hit->tool_count > 0 ||
-      !box_holds(by->geom, hit->nearest.point_b, step) || tick_hides(nearby, by->geom, hit->geom) ||
-      !hapi_geom_nearest(nearby, by->geom, hit->nearest.point_b, 0.0, step, &there)) {
-    return false;
-  }
-  hapi_v3_madd(by->nearest.point_b, radius, by->nearest.normal, held);
-  return !hapi_geom_nearest(nearby, hit->geom, held, radius, radius, &there) ||
-         there.distance > -step;
+  return box_holds(geom, hit->nearest.point_b, step) &&
+         hapi_geom_nearest(nearby, geom, hit->nearest.point_b, 0.0, step, &there);
 }
 
-/* Nearest first. */
-static void hits_hide(hapi_nearby *nearby, uint32_t count)
+static double seam_step(const hapi_nearby *nearby, const hapi_hit *hit)
+{
+  double radius = hapi_state_pointers(nearby->cycle->state)[hit->pointer].radius;
+  return fmin(SEAM_SHARE * radius, SEAM_MOST);
+}
+
+static bool hits_adjoin(hapi_nearby *nearby, const hapi_hit *a, const hapi_hit *b)
+{
+  double step = seam_step(nearby, a);
+  return a->pointer == b->pointer && a->tool_count == 0 && b->tool_count == 0 &&
+         (box_holds(b->geom, a->nearest.point_b, step) ||
+          box_holds(a->geom, b->nearest.point_b, step)) &&
+         !tick_hides(nearby, a->geom, b->geom) &&
+         (hit_lies_on(nearby, a, b->geom, step) || hit_lies_on(nearby, b, a->geom, step));
+}
+
+/* Also by a third one. */
+static bool hits_are_surface(hapi_nearby *nearby, const hapi_hit *a, const hapi_hit *b,
+                             uint32_t count)
+{
+  const hapi_hit *hits = nearby->neighbors.hits;
+  bool one = hits_adjoin(nearby, a, b);
+  bool both = a->nearest.distance < 0.0 && b->nearest.distance < 0.0;
+  for (uint32_t k = 0; k < count && both && !one; ++k) {
+    one = &hits[k] != a && &hits[k] != b && hits_adjoin(nearby, a, &hits[k]) &&
+          hits_adjoin(nearby, &hits[k], b);
+  }
+  return one;
+}
+
+/* Whether the sphere would not touch the other geom where one alone would hold it. */
+static bool hold_clears(hapi_nearby *nearby, const hapi_hit *by, const hapi_hit *other)
+{
+  double radius = hapi_state_pointers(nearby->cycle->state)[other->pointer].radius;
+  double held[3];
+  hapi_nearest there;
+  hapi_v3_madd(by->nearest.point_b, radius, by->nearest.normal, held);
+  return !hapi_geom_nearest(nearby, other->geom, held, radius, radius, &there) ||
+         there.distance > -seam_step(nearby, other);
+}
+
+/* Nearest first: one against all that are deeper. */
+static void hit_hide(hapi_nearby *nearby, uint32_t index, uint32_t count)
 {
   hapi_hit *hits = nearby->neighbors.hits;
-  for (uint32_t i = 0; i < count; ++i) {
-    hits[i].hidden = false;
-    for (uint32_t k = 0; k < i && !hits[i].hidden; ++k) {
-      hits[i].hidden = hit_hides(nearby, &hits[k], &hits[i]);
+  for (int turned = 0; turned < 2 && !hits[index].hidden; ++turned) {
+    for (uint32_t k = 0; k < index && !hits[index].hidden; ++k) {
+      hapi_hit *hidden = &hits[turned == 0 ? index : k];
+      const hapi_hit *by = &hits[turned == 0 ? k : index];
+      hidden->hidden = hidden->hidden || (hits_are_surface(nearby, by, hidden, count) &&
+                                          hold_clears(nearby, by, hidden));
     }
+  }
+}
+
+static void hits_hide(hapi_nearby *nearby, uint32_t count)
+{
+  for (uint32_t i = 0; i < count; ++i) {
+    nearby->neighbors.hits[i].hidden = false;
+    hit_hide(nearby, i, count);
   }
 }
 

@@ -192,14 +192,14 @@ static void render_contact(const hapi_tick_facts *facts, hapi_pointer *p, const 
   }
   double share = depth_of(&touches->tool, c, p, &at, facts->period, &depth);
   at.push = at.normal;
-  c->hidden = c->is_hidden;
+  c->shown = c->is_hidden ? 0.0 : 1.0;
   share *= hapi_held_touches_by(p, c);
   if (c->feel.special) {
-    const hapi_feel_place place = {p, at.body, at.normal, at.point, c->hidden ? 0.0 : share};
+    const hapi_feel_place place = {p, at.body, at.normal, at.point, c->shown > 0.0 ? share : 0.0};
     hapi_touch_feel_follow(touches, facts, &place, c, &depth);
     at.push = c->feel.lift.push;
   }
-  double force = c->hidden ? 0.0 : normal_force(facts, c, p, &at, share, depth);
+  double force = c->shown > 0.0 ? normal_force(facts, c, p, &at, share, depth) : 0.0;
   if ((force == 0.0 && !(c->feel.pull > 0.0)) || facts->faulted) {
     return;
   }
