@@ -216,7 +216,7 @@ TEST(the_room_is_that_of_the_tick)
 {
   for (int few = 0; few < 2; ++few) {
     contact_world *w = cw_new(G);
-    w->def.accuracy = 0.4;
+    w->def.accuracy = 0.3;
     chain_build(w, few ? 3 : LINKS);
     for (int i = 0; i < (few ? 0 : 40); ++i) {
       (void)cw_add_ball(w, 0.1, 0.02, 0.0412 * i, 0.3, 0.0);

@@ -7,6 +7,7 @@
 #include "base/alloc.h"
 #include "base/hash.h"
 #include "base/vec.h"
+#include "contact/covered.h"
 #include "contact/flat_areas.h"
 #include "contact/kept.h"
 #include "sync/mesh_filter.h"
@@ -38,6 +39,7 @@ struct hapi_pairs {
   uint32_t capacity; /* contacts */
   _Atomic uint64_t *left_out;
   hapi_kept kept;
+  hapi_covered covered;
   uint64_t numbers;  /* of contacts, that were given */
   uint64_t surfaces; /* of the near message: the same pairs in the same order have the same */
   pass_pair *pass;   /* as the pairs that are kept */
@@ -263,11 +265,32 @@ static void group_find(hapi_pairs *pairs, const hapi_near_pair *near, uint32_t c
   }
 }
 
-static void single_find(hapi_pairs *pairs, const hapi_near_pair *near)
+/* On either of its two geoms. */
+static bool pair_is_covered(const hapi_pairs *pairs, uint32_t index, const placed_pair *found)
+{
+  for (int side = 0; side < 2; ++side) {
+    hapi_covered_patch patch = {.pair = index, .side = side, .count = found->patch.count};
+    for (int i = 0; i < patch.count; ++i) {
+      const hapi_patch_point *p = &found->patch.points[i];
+      surface_point(side == 0 ? &found->a : &found->b, p, side == 1, patch.point[i]);
+      hapi_v3_scale(side == 0 ? -1.0 : 1.0, p->normal, patch.normal[i]);
+    }
+    if (hapi_covered_all(&pairs->covered, pairs->places, &pairs->kept, &patch)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+static void single_find(hapi_pairs *pairs, const hapi_near_pair *near, uint32_t index)
 {
   pair_group *group = pairs->group;
   placed_pair found;
   pair_find(pairs, near, &found);
+  if (found.patch.count > 0 && hapi_covered_asks(&pairs->covered, index) &&
+      pair_is_covered(pairs, index, &found)) {
+    found.patch.count = 0;
+  }
   group->margin = found.margin;
   group->clear = found.clear;
   group->gap = found.patch.count > 0 ? found.patch.points[0].gap : HUGE_VAL;
@@ -290,7 +313,7 @@ static void key_find(hapi_pairs *pairs, const hapi_pass_body *const bodies[2], h
   if (io->pairs > 1) {
     group_find(pairs, near, io->pairs);
   } else {
-    single_find(pairs, near);
+    single_find(pairs, near, (uint32_t)(io - pairs->kept.pairs));
   }
   hapi_kept_go_on(&pairs->kept, io, group->contacts, group->count, group->order);
   hapi_kept_find(&pairs->kept, io, bodies[0], bodies[1], group->margin);
@@ -467,6 +490,7 @@ static uint64_t surfaces_of(hapi_near *near)
 void hapi_pairs_take_near(hapi_pairs *pairs)
 {
   hapi_kept_take_near(&pairs->kept, pairs->places);
+  hapi_covered_take_near(&pairs->covered, pairs->places, &pairs->kept);
   pairs->surfaces = surfaces_of(pairs->places->near);
 }
 
@@ -496,8 +520,9 @@ bool hapi_pairs_create(const hapi_places *places, hapi_asking *asking,
   pairs->left_out = left_out;
   pairs->pass = hapi_alloc_array(capacity->pairs, sizeof *pairs->pass);
   pairs->group = hapi_alloc(sizeof *pairs->group);
-  return hapi_kept_create(&pairs->kept, capacity, asking->ask != NULL) && pairs->pass != NULL &&
-         pairs->group != NULL;
+  bool kept = hapi_kept_create(&pairs->kept, capacity, asking->ask != NULL);
+  bool covered = hapi_covered_create(&pairs->covered, capacity);
+  return kept && covered && pairs->pass != NULL && pairs->group != NULL;
 }
 
 void hapi_pairs_destroy(hapi_pairs *pairs)
@@ -506,6 +531,7 @@ void hapi_pairs_destroy(hapi_pairs *pairs)
     return;
   }
   hapi_kept_finish(&pairs->kept);
+  hapi_covered_finish(&pairs->covered);
   hapi_free(pairs->pass);
   hapi_free(pairs->group);
   hapi_free(pairs);

@@ -209,6 +209,20 @@ static void contact_hide(const seam_search *s, const hapi_hider *hidden, const h
   }
 }
 
+/* Mostly there are none: things around a pointer stand apart. */
+static bool seams_are_any(const seam_search *s)
+{
+  const hapi_hider *hiders = s->touches->hiders;
+  for (uint32_t i = 1; i < s->count; ++i) {
+    for (uint32_t k = 0; k < i; ++k) {
+      if (hiders[k].pointer == hiders[i].pointer && seam_parts(s, &hiders[k], &hiders[i]) < 1.0) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 /* One against all that are deeper. What one of them hides hides none: of a surface something is
  * left that pushes. */
 static void seams_of(const seam_search *s, const hapi_hider *own)
@@ -237,7 +251,8 @@ void hapi_seams_hide(const hapi_tick_facts *facts, const hapi_pointers *pointers
   for (uint32_t i = 0; i < touches->count; ++i) {
     touches->of[i].shown = touches->of[i].is_hidden ? 0.0 : 1.0;
   }
-  for (uint32_t k = 0; k < s.count; ++k) {
+  bool any = seams_are_any(&s);
+  for (uint32_t k = 0; k < s.count && any; ++k) {
     seams_of(&s, &touches->hiders[k]);
   }
 }
