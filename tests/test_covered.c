@@ -9,7 +9,7 @@
 #include "tests/contact_world.h"
 
 #define EDGE 0.06 /* m, of the cube */
-#define FROM -0.15
+#define FROM (-0.15)
 
 /* What a cube at a place slides over. */
 typedef struct ground_case {
@@ -35,7 +35,8 @@ static void two_tiles(contact_world *w, double step)
 static void many_tiles(contact_world *w, double step)
 {
   for (int i = 0; i < 25; ++i) {
-    add_tile(w, -0.2 + 0.1 * (i / 5), -0.2 + 0.1 * (i % 5), step * (i % 3 - 1));
+    int column = i / 5;
+    add_tile(w, -0.2 + 0.1 * column, -0.2 + 0.1 * (i % 5), step * (i % 3 - 1));
   }
 }
 
