@@ -195,15 +195,17 @@ TEST(four_that_are_not_as_high_push_once)
 {
   static const double heights[4] = {-1.2e-5, -5e-6, 1.8e-5, -3e-6};
   static const double depths[] = {0.0005, 0.0013, 0.002, 0.0035, 0.0044};
-  for (size_t n = 0; n < sizeof depths / sizeof depths[0]; ++n) {
+  for (size_t n = 0; n < 2 * (sizeof depths / sizeof depths[0]); ++n) {
     contact_world w;
+    double deep = depths[n / 2];
     double worst = 0.0;
     open_world(&w, 0.0);
+    w.def.model = n % 2 == 0 ? HAP_MODEL_CONTACT : HAP_MODEL_SINGLE; /* physics finds seams there */
     for (int i = 0; i < 4; ++i) {
       dGeomID block = add_block(&w, i < 2 ? -0.05 : 0.05, -0.05 + heights[i]);
       dGeomSetPosition(block, i < 2 ? -0.05 : 0.05, i % 2 == 0 ? 0.05 : -0.05, -0.05 + heights[i]);
     }
-    cw_start(&w, -0.004, 0.0016, RADIUS - depths[n]);
+    cw_start(&w, -0.004, 0.0016, RADIUS - deep);
     cw_run(&w, 100);
     cw_move_hand(&w, SPEED, -0.4 * SPEED, 0.0);
     for (int i = 0; i < 160; ++i) {
@@ -217,7 +219,7 @@ TEST(four_that_are_not_as_high_push_once)
       }
       worst = fmax(worst, fabs(cw_norm(w.force) / (K * deepest) - 1.0));
     }
-    CHECK_SAY(worst < 0.02, "%g m deep: %g off", depths[n], worst);
+    CHECK_SAY(worst < 0.02, "%g m deep: %g off", deep, worst);
     cw_close(&w);
   }
 }
