@@ -224,6 +224,30 @@ TEST(four_that_are_not_as_high_push_once)
   }
 }
 
+/* Beside a wall, over an edge on which the pointer is so deep that it points away from the wall. */
+TEST(a_wall_beside_such_an_edge_pushes_as_well)
+{
+  const double wall = -0.0041; /* m */
+  const double step = 2e-5;
+  const double deep = 0.0044;
+  contact_world w;
+  open_world(&w, 0.0);
+  (void)add_block(&w, -0.05, -0.05);
+  (void)add_block(&w, 0.05, -0.05 - step);
+  (void)add_block(&w, wall - 0.05, 0.05);
+  cw_start(&w, 0.006, 0.0, RADIUS - deep);
+  cw_run(&w, 100);
+  cw_move_hand(&w, -SPEED, 0.0, 0.0);
+  for (int i = 0; i < 120; ++i) {
+    cw_tick(&w);
+    double x = w.hand_at[0];
+    CHECK(w.force[0] > 0.9 * K * (RADIUS - (x - wall)));
+    CHECK(w.force[2] > 0.9 * K * deep && w.force[2] < 1.1 * K * deep);
+  }
+  CHECK(w.hand_at[0] < 1e-4);
+  cw_close(&w);
+}
+
 /* A slit that opens parts one thing into two. In no tick does much come to the force. */
 TEST(a_slit_that_opens_is_felt_little_by_little)
 {

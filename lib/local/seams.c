@@ -3,6 +3,7 @@
 #include "local/seams.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/pose.h"
 #include "local/ball_nearest.h"
@@ -60,13 +61,16 @@ static bool is_far(const hapi_hider *hider, const double point[3])
   return hapi_v3_dot(way, way) > hider->within * hider->within;
 }
 
+#define MARKED 64u /* hiders, of which it is marked which adjoin */
+
 /* What the seams of a tick are looked for in. */
 typedef struct seam_search {
   const hapi_tick_facts *facts;
   const hapi_pointers *pointers;
   const hapi_bodies *bodies;
   const hapi_touches *touches;
-  uint32_t count; /* hiders */
+  uint32_t count;           /* hiders */
+  uint64_t adjoins[MARKED]; /* by hider: those whose slit to it is closed; of no more than that */
 } seam_search;
 
 static hapi_local_contact *contact_of(const seam_search *s, const hapi_hider *hider)
@@ -101,20 +105,12 @@ static double seam_parts(const seam_search *s, const hapi_hider *a, const hapi_h
   return hapi_clamp((slit / step - 1.0) / (SLIT_MOST - 1.0), 0.0, 1.0);
 }
 
-/* The same of two that push, which may also hang together by a third one: two of four boxes whose
- * corners meet. */
-static double surface_parts(const seam_search *s, const hapi_hider *a, const hapi_hider *b)
+/* The same of two that may also hang together by a third one: two of four boxes whose corners
+ * meet. */
+static double surface_parts(const seam_search *s, uint32_t a, uint32_t b)
 {
-  double parts = seam_parts(s, a, b);
-  bool both = a->depth > 0.0 && b->depth > 0.0;
-  for (uint32_t k = 0; k < s->count && both && parts > 0.0; ++k) {
-    const hapi_hider *by = &s->touches->hiders[k];
-    if (by != a && by != b && by->pointer == a->pointer) {
-      double first = seam_parts(s, a, by);
-      parts = first < parts ? fmin(parts, fmax(first, seam_parts(s, by, b))) : parts;
-    }
-  }
-  return parts;
+  bool third = a < MARKED && b < MARKED && (s->adjoins[a] & s->adjoins[b]) != 0;
+  return third ? 0.0 : seam_parts(s, &s->touches->hiders[a], &s->touches->hiders[b]);
 }
 
 /* Whether the sphere would not touch the other thing where one alone would hold it. */
@@ -187,15 +183,18 @@ static uint32_t hiders_list(const hapi_pointers *pointers, const hapi_bodies *bo
       hider->depth = c->ramp.depth;
       hider->contact = i;
       hider->pointer = c->pointer;
+      hider->aside = false;
     }
   }
   return count;
 }
 
-/* The deeper one; of two that are as deep, the first. */
-static bool goes_before(const hapi_hider *hider, const hapi_local_contact *c, uint32_t index)
+/* Of one pointer, and the first is the deeper one; of two that are as deep, the first in the list. */
+static bool goes_before(const hapi_hider *hider, const hapi_hider *other)
 {
-  return hider->depth > c->ramp.depth || (hider->depth == c->ramp.depth && hider->contact < index);
+  return hider->pointer == other->pointer &&
+         (hider->depth > other->depth ||
+          (hider->depth == other->depth && hider->contact < other->contact));
 }
 
 /* shows: 0..1, how much of it is felt still. */
@@ -209,37 +208,59 @@ static void contact_hide(const seam_search *s, const hapi_hider *hidden, const h
   }
 }
 
-/* Mostly there are none: things around a pointer stand apart. */
-static bool seams_are_any(const seam_search *s)
+static void seam_mark(seam_search *s, uint32_t a, uint32_t b)
+{
+  if (a < MARKED && b < MARKED) {
+    s->adjoins[a] |= (uint64_t)1 << b;
+    s->adjoins[b] |= (uint64_t)1 << a;
+  }
+}
+
+/* False: there are none, as mostly. Things around a pointer stand apart. */
+static bool seams_find(seam_search *s)
 {
   const hapi_hider *hiders = s->touches->hiders;
+  bool any = false;
+  memset(s->adjoins, 0, sizeof s->adjoins);
   for (uint32_t i = 1; i < s->count; ++i) {
     for (uint32_t k = 0; k < i; ++k) {
-      if (hiders[k].pointer == hiders[i].pointer && seam_parts(s, &hiders[k], &hiders[i]) < 1.0) {
-        return true;
+      bool one = hiders[k].pointer == hiders[i].pointer;
+      double parts = one ? seam_parts(s, &hiders[k], &hiders[i]) : 1.0;
+      any = any || parts < 1.0;
+      if (!(parts > 0.0)) {
+        seam_mark(s, i, k);
       }
     }
   }
-  return false;
+  return any;
 }
 
-/* One against all that are deeper. What one of them hides hides none: of a surface something is
- * left that pushes. */
-static void seams_of(const seam_search *s, const hapi_hider *own)
+/* Edges that would hold the pointer aside of what is beside them, and in it. */
+static void edges_hide(const seam_search *s)
 {
-  const hapi_local_contact *c = contact_of(s, own);
-  for (int turned = 0; turned < 2 && c->shown >= 1.0; ++turned) {
-    for (uint32_t k = 0; k < s->count && c->shown > 0.0; ++k) {
-      const hapi_hider *deeper = &s->touches->hiders[k];
-      const hapi_hider *hidden = turned == 0 ? own : deeper;
-      const hapi_hider *by = turned == 0 ? deeper : own;
-      if (deeper->pointer != own->pointer || !goes_before(deeper, c, own->contact)) {
-        continue;
+  for (uint32_t i = 0; i < s->count; ++i) {
+    hapi_hider *edge = &s->touches->hiders[i];
+    for (uint32_t k = 0; k < s->count; ++k) {
+      const hapi_hider *beside = &s->touches->hiders[k];
+      double parts = goes_before(edge, beside) ? surface_parts(s, i, k) : 1.0;
+      if (parts < 1.0 && !hold_clears(s, edge, beside) && hold_clears(s, beside, edge)) {
+        edge->aside = true;
+        contact_hide(s, edge, beside, parts);
       }
-      double parts = surface_parts(s, deeper, own);
-      if (parts < 1.0 && hold_clears(s, by, hidden)) {
-        contact_hide(s, hidden, by, parts);
-      }
+    }
+  }
+}
+
+/* One that is no such edge, by the deeper ones that are none: the deepest of them pushes. */
+static void seam_hide(const seam_search *s, uint32_t index)
+{
+  const hapi_hider *own = &s->touches->hiders[index];
+  for (uint32_t k = 0; k < s->count && contact_of(s, own)->shown > 0.0 && !own->aside; ++k) {
+    const hapi_hider *deeper = &s->touches->hiders[k];
+    bool asks = goes_before(deeper, own) && !deeper->aside;
+    double parts = asks ? surface_parts(s, k, index) : 1.0;
+    if (parts < 1.0 && hold_clears(s, deeper, own)) {
+      contact_hide(s, own, deeper, parts);
     }
   }
 }
@@ -247,12 +268,16 @@ static void seams_of(const seam_search *s, const hapi_hider *own)
 void hapi_seams_hide(const hapi_tick_facts *facts, const hapi_pointers *pointers,
                      const hapi_bodies *bodies, const hapi_touches *touches)
 {
-  const seam_search s = {facts, pointers, bodies, touches, hiders_list(pointers, bodies, touches)};
+  seam_search s = {.facts = facts, .pointers = pointers, .bodies = bodies, .touches = touches};
+  s.count = hiders_list(pointers, bodies, touches);
   for (uint32_t i = 0; i < touches->count; ++i) {
     touches->of[i].shown = touches->of[i].is_hidden ? 0.0 : 1.0;
   }
-  bool any = seams_are_any(&s);
-  for (uint32_t k = 0; k < s.count && any; ++k) {
-    seams_of(&s, &touches->hiders[k]);
+  if (!seams_find(&s)) {
+    return;
+  }
+  edges_hide(&s);
+  for (uint32_t k = 0; k < s.count; ++k) {
+    seam_hide(&s, k);
   }
 }

@@ -216,6 +216,7 @@ typedef struct hapi_hider {
   double depth;     /* m */
   uint32_t contact; /* index */
   uint32_t pointer;
+  bool aside; /* an edge on which the pointer is deep: what is beside it holds the pointer */
 } hapi_hider;
 
 typedef struct hapi_touches {

@@ -592,15 +592,14 @@ static bool hits_adjoin(hapi_nearby *nearby, const hapi_hit *a, const hapi_hit *
          (hit_lies_on(nearby, a, b->geom, step) || hit_lies_on(nearby, b, a->geom, step));
 }
 
-/* Also by a third one. */
+/* Also by a third one: the corners of four meet. */
 static bool hits_are_surface(hapi_nearby *nearby, const hapi_hit *a, const hapi_hit *b,
                              uint32_t count)
 {
   const hapi_hit *hits = nearby->neighbors.hits;
   bool one = hits_adjoin(nearby, a, b);
-  bool both = a->nearest.distance < 0.0 && b->nearest.distance < 0.0;
-  for (uint32_t k = 0; k < count && both && !one; ++k) {
-    one = &hits[k] != a && &hits[k] != b && hits_adjoin(nearby, a, &hits[k]) &&
+  for (uint32_t k = 0; k < count && !one; ++k) {
+    one = hits[k].seams && &hits[k] != a && &hits[k] != b && hits_adjoin(nearby, a, &hits[k]) &&
           hits_adjoin(nearby, &hits[k], b);
   }
   return one;
@@ -617,25 +616,48 @@ static bool hold_clears(hapi_nearby *nearby, const hapi_hit *by, const hapi_hit 
          there.distance > -seam_step(nearby, other);
 }
 
-/* Nearest first: one against all that are deeper. */
-static void hit_hide(hapi_nearby *nearby, uint32_t index, uint32_t count)
+/* Which have seams with others; false: none, as mostly. */
+static bool seams_find(hapi_nearby *nearby, uint32_t count)
 {
   hapi_hit *hits = nearby->neighbors.hits;
-  for (int turned = 0; turned < 2 && !hits[index].hidden; ++turned) {
-    for (uint32_t k = 0; k < index && !hits[index].hidden; ++k) {
-      hapi_hit *hidden = &hits[turned == 0 ? index : k];
-      const hapi_hit *by = &hits[turned == 0 ? k : index];
-      hidden->hidden = hidden->hidden || (hits_are_surface(nearby, by, hidden, count) &&
-                                          hold_clears(nearby, by, hidden));
+  bool any = false;
+  for (uint32_t i = 0; i < count; ++i) {
+    hits[i].hidden = hits[i].aside = hits[i].seams = false;
+    for (uint32_t k = 0; k < i; ++k) {
+      if (hits_adjoin(nearby, &hits[k], &hits[i])) {
+        any = hits[i].seams = hits[k].seams = true;
+      }
     }
   }
+  return any;
 }
 
+static bool seam_between(hapi_nearby *nearby, const hapi_hit *a, const hapi_hit *b, uint32_t count)
+{
+  return a->seams && b->seams && hits_are_surface(nearby, a, b, count);
+}
+
+/* Nearest first. Edges go before the others that would hold the sphere aside of what is beside
+ * them, and in it. */
 static void hits_hide(hapi_nearby *nearby, uint32_t count)
 {
+  hapi_hit *hits = nearby->neighbors.hits;
+  if (!seams_find(nearby, count)) {
+    return;
+  }
   for (uint32_t i = 0; i < count; ++i) {
-    nearby->neighbors.hits[i].hidden = false;
-    hit_hide(nearby, i, count);
+    for (uint32_t k = 0; k < i; ++k) {
+      hits[k].aside = hits[k].aside || (seam_between(nearby, &hits[k], &hits[i], count) &&
+                                        !hold_clears(nearby, &hits[k], &hits[i]) &&
+                                        hold_clears(nearby, &hits[i], &hits[k]));
+    }
+  }
+  for (uint32_t i = 0; i < count; ++i) {
+    hits[i].hidden = hits[i].aside;
+    for (uint32_t k = 0; k < i && !hits[i].hidden; ++k) {
+      hits[i].hidden = !hits[k].aside && seam_between(nearby, &hits[k], &hits[i], count) &&
+                       hold_clears(nearby, &hits[k], &hits[i]);
+    }
   }
 }
 

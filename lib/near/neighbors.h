@@ -32,6 +32,8 @@ typedef struct hapi_hit {
   uint32_t tool_count;  /* 0: a sphere */
   hap_pose tool_pose;   /* for which they were found */
   bool hidden;          /* of a sphere: by a nearer one, of the same surface */
+  bool aside;           /* likewise: an edge, by what is beside it; see local/seams.h */
+  bool seams;           /* it adjoins another one */
   double reach;         /* m, as far as the two may come until the next step */
   hapi_feels_said said; /* of the pair, by the application */
 } hapi_hit;
