@@ -189,7 +189,7 @@ static uint32_t hiders_list(const hapi_pointers *pointers, const hapi_bodies *bo
   return count;
 }
 
-/* Of one pointer, and the first is the deeper one; of two that are as deep, the first in the list. */
+/* Of one pointer, and the first is the deeper one; of two that are as deep, that of lower index. */
 static bool goes_before(const hapi_hider *hider, const hapi_hider *other)
 {
   return hider->pointer == other->pointer &&
