@@ -449,7 +449,7 @@ typedef struct storm_hand {
   double radius;
   double hz;
   bool running;
-  double force[3]; /* N, held */
+  _Atomic double force[3]; /* N, held */
   storm_book book;
 } storm_hand;
 
@@ -480,9 +480,12 @@ static void hand_describe(void *self, uint32_t effector, hap_device_info *out)
   out->max_torque = 1.0;
 }
 
+/* Zero comes from any thread, also in the midst of a write. */
 static void hand_hold(storm_hand *hand, const double force[3])
 {
-  hapi_v3_copy(force, hand->force);
+  for (int i = 0; i < 3; ++i) {
+    atomic_store(&hand->force[i], force[i]);
+  }
   atomic_store(&hand->book.holds, hapi_v3_norm(force) > 0.0);
 }
 
@@ -514,7 +517,9 @@ static hap_status write_hand(void *self, const hap_device_output *const wanted[]
   storm_hand *hand = self;
   storm_book *book = &hand->book;
   double change[3];
-  hapi_v3_sub(wanted[0]->wrench.force, hand->force, change);
+  for (int i = 0; i < 3; ++i) {
+    change[i] = wanted[0]->wrench.force[i] - atomic_load(&hand->force[i]);
+  }
   double force = hapi_v3_norm(wanted[0]->wrench.force);
   double step = hapi_v3_norm(change);
   bool good = hand->running && force <= STORM_FORCE * (1.0 + 1e-9) &&

@@ -271,8 +271,8 @@ hap_status hap_session_start(hap_session *session)
                              "anew");
   }
   hap_status status = hapi_session_note(session, session_begin(session, &detail), &detail);
+  session->started = session->ran = true; /* before others get the lock: they ask for it then */
   (void)hapi_physics_unlock(session->physics);
-  session->started = session->ran = true;
   session->starter = pthread_self();
   if (status >= HAP_OK && session->def.drive != HAP_DRIVE_LOCKSTEP) {
     void *block = hapi_exchange_memory(session->exchange, &size);
