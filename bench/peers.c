@@ -219,7 +219,7 @@ typedef struct peers_truth {
   double floor; /* of the force; NaN: not known */
 } peers_truth;
 
-/* A truth that another process finds meanwhile. */
+/* A truth that a child process computes at the same time. */
 typedef struct truth_apart {
   pid_t pid;
   double (*force)[3]; /* of all ticks, in memory that both see */
@@ -243,6 +243,8 @@ static hap_status apart_begin(bench *b, const peer_engine *engine, const peers_c
     bool fits = status >= HAP_OK && run.count <= out->count;
     if (fits) {
       memcpy(out->force, run.force, run.count * sizeof *run.force);
+    } else {
+      fprintf(stderr, "second truth of %s: %s\n", of->world, b->detail.text);
     }
     _exit(fits ? EXIT_SUCCESS : EXIT_FAILURE);
   }

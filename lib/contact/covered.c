@@ -2,35 +2,22 @@
  * SPDX-License-Identifier: MIT */
 #include "contact/covered.h"
 
-#include <string.h>
-
 #include "base/alloc.h"
 #include "base/vec.h"
 
 #define AHEAD 1e-3 /* m, before a side: what covers it is there, and what slides sinks in by less */
 #define STEP 1e-4  /* m, between two surfaces, that is none: as of seams under a pointer */
 
-/* At most half full. */
-static uint32_t places_for(uint32_t pairs)
-{
-  uint32_t places = 2;
-  while (places < 2 * pairs) {
-    places *= 2;
-  }
-  return places;
-}
-
 bool hapi_covered_create(hapi_covered *covered, const hapi_capacity *capacity)
 {
   covered->next = hapi_alloc_array(capacity->pairs, sizeof *covered->next);
-  covered->table = hapi_alloc_array(places_for(capacity->pairs), sizeof *covered->table);
-  return covered->next != NULL && covered->table != NULL;
+  return covered->next != NULL && hapi_index_reserve(&covered->firsts, capacity->pairs);
 }
 
 void hapi_covered_finish(hapi_covered *covered)
 {
   hapi_free(covered->next);
-  hapi_free(covered->table);
+  hapi_index_finish(&covered->firsts);
 }
 
 static uint32_t body_of(const hapi_places *places, const hapi_kept_pair *pair, int side)
@@ -38,49 +25,32 @@ static uint32_t body_of(const hapi_places *places, const hapi_kept_pair *pair, i
   return hapi_near_geoms(places->near)[pair->geoms[side]].body;
 }
 
-static bool bodies_are_same(const hapi_places *places, const hapi_kept_pair *a,
-                            const hapi_kept_pair *b)
-{
-  uint32_t bodies[2][2];
-  for (int side = 0; side < 2; ++side) {
-    bodies[0][side] = body_of(places, a, side);
-    bodies[1][side] = body_of(places, b, side);
-  }
-  return (bodies[0][0] == bodies[1][0] && bodies[0][1] == bodies[1][1]) ||
-         (bodies[0][0] == bodies[1][1] && bodies[0][1] == bodies[1][0]);
-}
-
-static uint32_t place_of(const hapi_covered *covered, const hapi_places *places,
-                         const hapi_kept_pair *pair)
+static uint64_t bodies_of(const hapi_places *places, const hapi_kept_pair *pair)
 {
   uint64_t a = body_of(places, pair, 0);
   uint64_t b = body_of(places, pair, 1);
-  uint64_t both = a < b ? a << 32 | b : b << 32 | a;
-  return (uint32_t)(both * 0x9e3779b97f4a7c15u >> 32) & (covered->places - 1);
+  return a < b ? a << 32 | b : b << 32 | a;
 }
 
 void hapi_covered_take_near(hapi_covered *covered, const hapi_places *places, const hapi_kept *kept)
 {
-  covered->places = places_for(kept->count);
-  memset(covered->table, 0, covered->places * sizeof *covered->table);
   for (uint32_t i = 0; i < kept->count; ++i) {
-    uint32_t at = place_of(covered, places, &kept->pairs[i]);
-    while (covered->table[at] != 0 &&
-           !bodies_are_same(places, &kept->pairs[covered->table[at] - 1], &kept->pairs[i])) {
-      at = (at + 1) & (covered->places - 1);
-    }
+    uint64_t bodies = bodies_of(places, &kept->pairs[i]);
+    uint32_t first = hapi_index_get(&covered->firsts, bodies);
     covered->next[i] = i;
-    if (covered->table[at] == 0) {
-      covered->table[at] = i + 1;
+    if (first == HAPI_INDEX_NONE) {
+      hapi_index_put(&covered->firsts, bodies, i);
     } else {
-      uint32_t first = covered->table[at] - 1;
       covered->next[i] = covered->next[first];
       covered->next[first] = i;
     }
   }
+  for (uint32_t i = 0; i < kept->count; ++i) { /* a few of many places: no clear */
+    hapi_index_remove(&covered->firsts, bodies_of(places, &kept->pairs[i]));
+  }
 }
 
-bool hapi_covered_asks(const hapi_covered *covered, uint32_t pair)
+bool hapi_covered_has_others(const hapi_covered *covered, uint32_t pair)
 {
   return covered->next[pair] != pair;
 }
@@ -101,7 +71,8 @@ static double distance_to(const hapi_placed_geom *geom, const double point[3], d
   return nearest.distance;
 }
 
-/* Whether one thing stands before a side of another one at a point, and the other is no higher. */
+/* Whether one geom stands in front of a side of another one at a point, and the other one is no
+ * higher. up: out of the first one's surface. */
 static bool point_is_covered(const hapi_placed_geom *by, const hapi_placed_geom *side,
                              const double point[3], const double normal[3])
 {

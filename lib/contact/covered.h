@@ -3,22 +3,22 @@
 #ifndef HAPODE_CONTACT_COVERED_H
 #define HAPODE_CONTACT_COVERED_H
 
-/* Things of one body, or of the static world, that lie side by side are one surface, as the tiles
- * of a floor. What slides over the seam meets the side of the next one as well, from the layer that
- * it sinks in, or as the next one comes near, and would be stopped there. ODE is. A side is covered
- * where another thing of the same body stands before it, and what is covered rises no higher than
- * that. A pair all of whose points are on covered sides has no contact. */
+/* Geoms of one body, or of the static world, that lie side by side are one surface, as the tiles of
+ * a floor. A body that slides from one tile to the next one sinks a little into the first, so its
+ * front meets the side of the next, and would stop there, as in ODE. A side is covered at a point
+ * where another geom of the same body stands in front of it and is as high, to 0.1 mm. A pair of
+ * geoms has no contact where all of its points are on covered sides. */
 
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/index.h"
 #include "contact/kept.h"
 #include "contact/places.h"
 
 typedef struct hapi_covered {
-  uint32_t *next;  /* by pair of hapi_kept: the next one of the same two bodies, in a ring */
-  uint32_t *table; /* scratch: of pairs by their bodies: number + 1; 0: free */
-  uint32_t places; /* of the table that are in use, a power of two */
+  uint32_t *next;    /* by pair of hapi_kept: the next one of the same two bodies, in a ring */
+  hapi_index firsts; /* scratch: pairs by their two bodies */
 } hapi_covered;
 
 /* Of one pair, where its points are on one of its two geoms. */
@@ -39,7 +39,7 @@ void hapi_covered_take_near(hapi_covered *covered, const hapi_places *places,
                             const hapi_kept *kept);
 
 /* Whether other pairs have the same two bodies. */
-bool hapi_covered_asks(const hapi_covered *covered, uint32_t pair);
+bool hapi_covered_has_others(const hapi_covered *covered, uint32_t pair);
 
 /* Whether all points are on covered sides. Hulls cover nothing, and are not covered. */
 bool hapi_covered_all(const hapi_covered *covered, const hapi_places *places, const hapi_kept *kept,

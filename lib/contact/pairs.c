@@ -287,7 +287,7 @@ static void single_find(hapi_pairs *pairs, const hapi_near_pair *near, uint32_t 
   pair_group *group = pairs->group;
   placed_pair found;
   pair_find(pairs, near, &found);
-  if (found.patch.count > 0 && hapi_covered_asks(&pairs->covered, index) &&
+  if (found.patch.count > 0 && hapi_covered_has_others(&pairs->covered, index) &&
       pair_is_covered(pairs, index, &found)) {
     found.patch.count = 0;
   }
@@ -473,7 +473,7 @@ static void leave_out_farthest(hapi_pairs *pairs)
 
 /* ---- a pass ---- */
 
-/* One surface after the other is mostly the same. */
+/* Of two neighbours in the list the surfaces are mostly the same: they are compared first. */
 static uint64_t surfaces_of(hapi_near *near)
 {
   const hapi_near_pair *pairs = hapi_near_pairs(near);

@@ -13,8 +13,9 @@
 /* A step between two surfaces that is none: of the pointer's radius, and m at most. */
 #define ON_SHARE 0.01
 #define ON_MOST 1e-4
-#define SLIT_MOST 2.0 /* steps: a slit that is wider parts two things; up to there it comes to */
-#define REACH 2.0     /* radii: things that are farther have no part in the touch */
+#define SLIT_MOST \
+  2.0             /* steps: beyond it both contacts push; from one step on the second fades in */
+#define REACH 2.0 /* radii: things that are farther have no part in the touch */
 
 /* m, from a ball to the contact's shape; false: it has none that can be asked. */
 static bool shape_distance(const hapi_touches *touches, const hapi_local_contact *c,
@@ -61,7 +62,7 @@ static bool is_far(const hapi_hider *hider, const double point[3])
   return hapi_v3_dot(way, way) > hider->within * hider->within;
 }
 
-#define MARKED 64u /* hiders, of which it is marked which adjoin */
+#define MARKED 64u /* hiders whose neighbours are marked: a bit each */
 
 /* What the seams of a tick are looked for in. */
 typedef struct seam_search {
@@ -70,7 +71,7 @@ typedef struct seam_search {
   const hapi_bodies *bodies;
   const hapi_touches *touches;
   uint32_t count;           /* hiders */
-  uint64_t adjoins[MARKED]; /* by hider: those whose slit to it is closed; of no more than that */
+  uint64_t adjoins[MARKED]; /* by hider: bits of those that adjoin it, of the first ones */
 } seam_search;
 
 static hapi_local_contact *contact_of(const seam_search *s, const hapi_hider *hider)
@@ -94,8 +95,8 @@ static double hider_distance(const seam_search *s, const hapi_hider *hider, cons
   return distance;
 }
 
-/* 0 where two adjoin, 1 where they do not. */
-static double seam_parts(const seam_search *s, const hapi_hider *a, const hapi_hider *b)
+/* Share of the second contact that is felt: 0 where the two adjoin, 1 where they do not. */
+static double slit_share(const seam_search *s, const hapi_hider *a, const hapi_hider *b)
 {
   double step = no_step(radius_of(s, a));
   double slit = hider_distance(s, a, contact_of(s, b)->point_now);
@@ -107,10 +108,10 @@ static double seam_parts(const seam_search *s, const hapi_hider *a, const hapi_h
 
 /* The same of two that may also hang together by a third one: two of four boxes whose corners
  * meet. */
-static double surface_parts(const seam_search *s, uint32_t a, uint32_t b)
+static double surface_share(const seam_search *s, uint32_t a, uint32_t b)
 {
   bool third = a < MARKED && b < MARKED && (s->adjoins[a] & s->adjoins[b]) != 0;
-  return third ? 0.0 : seam_parts(s, &s->touches->hiders[a], &s->touches->hiders[b]);
+  return third ? 0.0 : slit_share(s, &s->touches->hiders[a], &s->touches->hiders[b]);
 }
 
 /* Whether the sphere would not touch the other thing where one alone would hold it. */
@@ -216,7 +217,7 @@ static void seam_mark(seam_search *s, uint32_t a, uint32_t b)
   }
 }
 
-/* False: there are none, as mostly. Things around a pointer stand apart. */
+/* Marks which contacts adjoin. False: none do, which is the usual case. */
 static bool seams_find(seam_search *s)
 {
   const hapi_hider *hiders = s->touches->hiders;
@@ -225,9 +226,9 @@ static bool seams_find(seam_search *s)
   for (uint32_t i = 1; i < s->count; ++i) {
     for (uint32_t k = 0; k < i; ++k) {
       bool one = hiders[k].pointer == hiders[i].pointer;
-      double parts = one ? seam_parts(s, &hiders[k], &hiders[i]) : 1.0;
-      any = any || parts < 1.0;
-      if (!(parts > 0.0)) {
+      double share = one ? slit_share(s, &hiders[k], &hiders[i]) : 1.0;
+      any = any || share < 1.0;
+      if (!(share > 0.0)) {
         seam_mark(s, i, k);
       }
     }
@@ -235,32 +236,32 @@ static bool seams_find(seam_search *s)
   return any;
 }
 
-/* Edges that would hold the pointer aside of what is beside them, and in it. */
+/* Edges on which a pointer is deep: alone they would hold it aside, inside of their neighbour. */
 static void edges_hide(const seam_search *s)
 {
   for (uint32_t i = 0; i < s->count; ++i) {
     hapi_hider *edge = &s->touches->hiders[i];
     for (uint32_t k = 0; k < s->count; ++k) {
       const hapi_hider *beside = &s->touches->hiders[k];
-      double parts = goes_before(edge, beside) ? surface_parts(s, i, k) : 1.0;
-      if (parts < 1.0 && !hold_clears(s, edge, beside) && hold_clears(s, beside, edge)) {
+      double share = goes_before(edge, beside) ? surface_share(s, i, k) : 1.0;
+      if (share < 1.0 && !hold_clears(s, edge, beside) && hold_clears(s, beside, edge)) {
         edge->aside = true;
-        contact_hide(s, edge, beside, parts);
+        contact_hide(s, edge, beside, share);
       }
     }
   }
 }
 
-/* One that is no such edge, by the deeper ones that are none: the deepest of them pushes. */
+/* All others, by deeper contacts that are no such edges: the deepest of these pushes. */
 static void seam_hide(const seam_search *s, uint32_t index)
 {
   const hapi_hider *own = &s->touches->hiders[index];
   for (uint32_t k = 0; k < s->count && contact_of(s, own)->shown > 0.0 && !own->aside; ++k) {
     const hapi_hider *deeper = &s->touches->hiders[k];
     bool asks = goes_before(deeper, own) && !deeper->aside;
-    double parts = asks ? surface_parts(s, k, index) : 1.0;
-    if (parts < 1.0 && hold_clears(s, deeper, own)) {
-      contact_hide(s, own, deeper, parts);
+    double share = asks ? surface_share(s, k, index) : 1.0;
+    if (share < 1.0 && hold_clears(s, deeper, own)) {
+      contact_hide(s, own, deeper, share);
     }
   }
 }

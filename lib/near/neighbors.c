@@ -616,7 +616,7 @@ static bool hold_clears(hapi_nearby *nearby, const hapi_hit *by, const hapi_hit 
          there.distance > -seam_step(nearby, other);
 }
 
-/* Which have seams with others; false: none, as mostly. */
+/* Marks the hits that adjoin others. False: none do, which is the usual case. */
 static bool seams_find(hapi_nearby *nearby, uint32_t count)
 {
   hapi_hit *hits = nearby->neighbors.hits;
@@ -637,8 +637,8 @@ static bool seam_between(hapi_nearby *nearby, const hapi_hit *a, const hapi_hit 
   return a->seams && b->seams && hits_are_surface(nearby, a, b, count);
 }
 
-/* Nearest first. Edges go before the others that would hold the sphere aside of what is beside
- * them, and in it. */
+/* Nearest first. As in local/seams.c, first come edges on which the sphere is deep: alone they would
+ * hold it aside, inside of their neighbour. */
 static void hits_hide(hapi_nearby *nearby, uint32_t count)
 {
   hapi_hit *hits = nearby->neighbors.hits;

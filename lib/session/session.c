@@ -271,7 +271,7 @@ hap_status hap_session_start(hap_session *session)
                              "anew");
   }
   hap_status status = hapi_session_note(session, session_begin(session, &detail), &detail);
-  session->started = session->ran = true; /* before others get the lock: they ask for it then */
+  session->started = session->ran = true; /* under the lock: hap_session_unlock reads it */
   (void)hapi_physics_unlock(session->physics);
   session->starter = pthread_self();
   if (status >= HAP_OK && session->def.drive != HAP_DRIVE_LOCKSTEP) {

@@ -84,7 +84,7 @@ static bool bounded_find(hapi_island *is, hapi_bounded *out)
   return joints > 0 && out->count > 0;
 }
 
-/* What row k takes from the error of row i, i takes from that of k. */
+/* The answers are symmetric: one half is computed. */
 static void answers_find(hapi_island *is, hapi_bounded *b)
 {
   const uint32_t n = b->count;
