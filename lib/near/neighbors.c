@@ -637,8 +637,8 @@ static bool seam_between(hapi_nearby *nearby, const hapi_hit *a, const hapi_hit 
   return a->seams && b->seams && hits_are_surface(nearby, a, b, count);
 }
 
-/* Nearest first. As in local/seams.c, first come edges on which the sphere is deep: alone they would
- * hold it aside, inside of their neighbour. */
+/* Nearest first. As in local/seams.c, first come edges on which the sphere is deep: alone they
+ * would hold it aside, inside of their neighbour. */
 static void hits_hide(hapi_nearby *nearby, uint32_t count)
 {
   hapi_hit *hits = nearby->neighbors.hits;
