@@ -130,7 +130,8 @@ static void check_ball(const hapi_solver *solver, uint32_t normal, int ball, int
   if (radius == 0.0) {
     return;
   }
-  bool free = force < radius * (1.0 - 1e-6);
+  const double left = solver->tolerance * f->inverse; /* N s, that may be left */
+  bool free = force < radius * (1.0 - 1e-6) - left;
   along = free ? 0.0 : along / force;
   for (int i = 0; i < ball; ++i) {
     double rest = error[i] - (free ? 0.0 : along * f[i].impulse / force);

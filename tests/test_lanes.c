@@ -140,6 +140,9 @@ TEST(direct_solves)
   uint32_t solves = 0;
   for (uint64_t seed = 1; seed <= 10 && !is_plain(); ++seed) {
     problem_make(seed, 200000, ROWS);
+    for (uint32_t i = 0; i < 3 * CONTACTS; ++i) { /* of more there is no solution */
+      wide.rows[i].mu = plain.rows[i].mu *= 0.1;
+    }
     hapi_solver_run(&wide.solver);
     plain_hapi_solver_run(&plain.solver);
     solvers_compare();

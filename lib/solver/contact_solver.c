@@ -30,15 +30,16 @@
 /* A direct solve is made where so many sweeps will not do. It costs 15 to 20; with more than 13 a
  * stack of 30 cubes under a hand gains energy. */
 #define DIRECT_SWEEPS 10u
-#define PACKED_SWEEPS 12u /* where contacts are in packs, not before so many */
-#define PAIRS_EACH 4u     /* sweeps, of steps of all pairs */
-#define PAIRS_FALL 0.25   /* of what sweeps correct, from one such step to the next */
+#define DIRECT_FROM 2u  /* sweeps before the first one */
+#define PAIRS_EACH 4u   /* sweeps, of steps of all pairs */
+#define PAIRS_FALL 0.25 /* of what sweeps correct, from one such step to the next */
 
 /* A run that has taken enough may leave so many times `coarse`, which is four times the drift of
  * the force. It makes no direct solve where so many times the sweeps that one costs will do: the
  * next runs make them. */
 #define LEAVE 16.0
 #define LEAVE_SWEEPS 3u
+#define CHEAP_COST 1000u /* row updates, of such a direct solve */
 #define LEAVE_LIGHT 10.0 /* times the largest correction, of things so light that no hand tells */
 /* Levels. A higher stack is solved at once, and one by one (packs.c): of eight cubes that a hand
  * leans on, what is left says which of them slide, and the force is off by 0.2 to 6 %. */
@@ -701,6 +702,10 @@ static bool sweeps_suffice(const hapi_solver *solver, double rate, uint32_t time
 {
   double share = 1.0;
   uint32_t sweeps = times * DIRECT_SWEEPS * solver->row_count / hapi_solver_sweep_cost(solver);
+  if (solver->max_sweeps > 0) {
+    uint32_t left = solver->max_sweeps > solver->sweeps ? solver->max_sweeps - solver->sweeps : 0;
+    sweeps = sweeps < left ? sweeps : left;
+  }
   for (uint32_t i = 0; i < sweeps; ++i) {
     share *= rate;
   }
@@ -756,7 +761,7 @@ static bool may_leave(const hapi_solver *solver, bool tried)
 static bool direct_pays(const hapi_solver *solver, double rate, bool first, bool tried)
 {
   bool fits = solver->updates + solver->direct.cost <= solver->enough;
-  bool cheap = solver->direct.cost <= VAIN_COST;
+  bool cheap = solver->direct.cost <= CHEAP_COST;
   return !sweeps_suffice(solver, rate, 1) &&
          (fits || !may_leave(solver, tried) ||
           (first && cheap && !sweeps_suffice(solver, rate, LEAVE_SWEEPS)));
@@ -783,6 +788,7 @@ void hapi_solver_run(hapi_solver *solver)
   solver->sweeps = 0;
   solver->updates = 0;
   solver->direct_solves = 0;
+  solver->direct.runs = 0;
   solver->residual = 0.0;
   bool may = solver->direct_rows > 0;
   bool dear = may && stays_dear(solver);
@@ -807,9 +813,9 @@ void hapi_solver_run(hapi_solver *solver)
   }
   bool ahead = way_place(solver, &way);
   uint32_t cost = hapi_solver_sweep_cost(solver);
-  uint32_t direct_from = solver->packs.in_use ? PACKED_SWEEPS : 2; /* sweeps */
-  double before[2] = {0.0, 0.0}; /* corrected, after the last sweep and the one before */
-  double at_pairs = HUGE_VAL;    /* corrected, before the last step of all pairs */
+  uint32_t direct_from = DIRECT_FROM; /* sweeps */
+  double before[2] = {0.0, 0.0};      /* corrected, after the last sweep and the one before */
+  double at_pairs = HUGE_VAL;         /* corrected, before the last step of all pairs */
   hapi_sweep_trend trend;
   hapi_trend_begin(&trend);
   for (uint32_t rounds = 0; rows > 0;) {
@@ -850,6 +856,7 @@ void hapi_solver_run(hapi_solver *solver)
       uint32_t spent = direct_run(solver, (uint32_t)left - cost);
       updates_spend(solver, &left, spent);
       solver->direct.cost = spent;
+      ++solver->direct.runs;
       tried = tried || solver->direct_solves == accepted;
       if (solver->direct_solves == accepted && solver->coarse.energy2 > 0.0) {
         direct_from = solver->sweeps + VAIN_SWEEPS;

@@ -44,7 +44,7 @@ typedef enum hapi_direct_end {
 typedef struct hapi_direct_last {
   hapi_direct_end end;
   uint32_t cost;   /* row updates */
-  uint32_t damped; /* so many more begin with rounds that are damped: others led to nothing */
+  uint32_t runs;   /* before it, of the same run of the solver */
   double residual; /* the largest correction due after it, m/s */
 } hapi_direct_last;
 

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* Direct solves of islands: rounds of active sets (island.c), of the whole or, about hubs, part by
- * part. */
+/* Direct solves of islands: rounds of Newton's method (island.c), of the whole or, about hubs, part
+ * by part. */
 
 #include <math.h>
 #include <stdbool.h>
@@ -11,15 +11,14 @@
 #include "solver/island.h"
 #include "solver/island_reduced.h"
 
-#define INNER_ROUNDS 2 /* active sets tried from one state */
-#define WORSE 30.0     /* how much the largest correction may grow in a round */
-#define FIRM 1e-8      /* R of island.c */
-#define DAMPED 1e-3    /* the same, where such rounds lead to nothing */
-#define DAMPED_ROUNDS 2
-#define DAMPED_RUNS 8 /* that begin so, before others are tried again */
-#define HUBS_MAX 16   /* with more, islands about hubs are solved as others */
-#define HUB_ROUNDS 6  /* steps of the hubs */
-#define LEAF_ROUNDS 6 /* active sets of a leaf, of one step */
+#define ROUNDS 6u      /* of an island */
+#define ROUNDS_VAIN 4u /* the same, where none has made things better */
+#define SOFTER 10.0    /* times R, after a round that made things worse */
+#define FIRMER 0.01    /* times that, where R leaves too much of the errors */
+#define AGAIN 3        /* times the same matrix, at most, */
+#define ENOUGH 1e-6    /* until so much of the tolerance is due */
+#define HUBS_MAX 16    /* with more, islands about hubs are solved as others */
+#define HUB_ROUNDS 6   /* steps of the hubs */
 
 /* Lists of rows: of each island, and in it, one after another, of each part that hangs together
  * without hubs. By the lowest body. */
@@ -99,70 +98,98 @@ static void islands_split(hapi_solver *solver, lists *out)
   chain_leaves(solver, whole, out);
 }
 
-/* ---- rounds of the whole ---- */
+/* ---- rounds ---- */
 
-/* Whether the state after a round is to be kept. The largest correction due, of one row at a bound,
- * is a poor measure of the whole: it may grow for a while where sweeps and further rounds follow.
- * Where there is no room for them, the last one, the round must leave less energy as well, or its
- * impulses blow up in the ticks to come. */
-static bool is_better(const hapi_island *is, double due, double best, bool last)
+/* Newton's method. */
+typedef struct newton {
+  hapi_island *is;
+  double least; /* due in the best state, which is saved, m/s */
+  double due;   /* in the one at hand */
+  uint32_t rounds;
+  uint32_t step; /* row updates, of a round; */
+  uint32_t left; /* these */
+  bool better;   /* than the first state */
+  bool solved;   /* the best one is the end, */
+  bool outside;  /* and some of its impulses are out of their bounds */
+} newton;
+
+/* stays: the set of active rows did in the round. What is cut at a bound may open joints. */
+static void state_take(newton *n, bool stays)
 {
-  return last ? due < best && hapi_island_rise(is, is->saved_impulse, is->saved_error) < 0.0
-              : due < WORSE * best;
+  hapi_island *is = n->is;
+  const double tolerance = is->solver->tolerance;
+  if (stays && is->look.settled && n->due >= tolerance && is->look.outside) {
+    hapi_island_cut(is);
+    n->due = hapi_island_inspect(is, false);
+  }
+  bool solved = n->due < tolerance || (stays && is->look.settled);
+  if (solved || (n->due < n->least && !n->solved)) {
+    n->solved = solved;
+    n->better = true;
+    n->least = n->due;
+    n->outside = is->look.outside;
+    hapi_island_save(is);
+  }
 }
 
-/* The best of some rounds is kept, each with the active set that the one before leads to. */
-static bool island_improve(hapi_island *is, double before, bool last, double *out_due)
+/* A round, and more with its matrix where the set of active rows stays, in half the time: each
+ * takes most of what R has left of the errors, so that what rests is at rest. */
+static void round_make(newton *n)
 {
-  double best = before;
-  bool better = false;
-  *out_due = before;
-  hapi_island_save(is);
-  for (int round = 0; round < INNER_ROUNDS; ++round) {
-    hapi_island_solve(is);
-    double due = hapi_island_inspect(is, false);
-    if (last && !(due < is->solver->tolerance)) {
-      hapi_island_settle(is);
-      due = hapi_island_inspect(is, false);
+  hapi_island *is = n->is;
+  hapi_island_gains(is);
+  hapi_island_bound(is);
+  hapi_island_solve(is);
+  n->due = hapi_island_inspect(is, false);
+  ++n->rounds;
+  n->left -= n->step;
+  const bool stays = !is->look.changed;
+  for (int i = 0; i < AGAIN && n->left >= n->step && !is->look.changed; ++i) {
+    if (n->due < ENOUGH * is->solver->tolerance) {
+      break;
     }
-    if (due < is->solver->tolerance || is->settled) {
-      *out_due = due;
-      return true; /* nothing to save, nothing to restore */
-    }
-    if (better ? due < best : is_better(is, due, best, last)) {
-      *out_due = best = due;
-      hapi_island_save(is);
-      better = true;
-    }
+    hapi_island_solve_again(is);
+    n->left -= n->step / 2;
+    n->due = hapi_island_inspect(is, false);
   }
-  hapi_island_restore(is);
-  return better;
+  state_take(n, stays);
 }
 
-/* Where more contacts are taken to stick or to push than can, as in a tower whose cubes come to
- * slide, the equations have no solution, and impulses grow by 1 / R. With a larger R a round is a
- * short step (Levenberg and Marquardt), and from the set that it leads to sweeps go on. Each must
- * leave less energy. Returns the cost in row updates. */
-static uint32_t island_damp(hapi_island *is, uint32_t step, double *io_due, bool *out_better)
+static bool has_time(const newton *n)
 {
-  uint32_t rounds = 0;
-  bool falls = true;
-  is->softening = DAMPED;
-  (void)hapi_island_inspect(is, false);
+  return n->rounds < (n->better ? ROUNDS : ROUNDS_VAIN) && n->left >= n->step;
+}
+
+/* From the impulses at hand. A step is shorter with more R (Levenberg and Marquardt): the next one
+ * has more where one made things worse, and less where it did not. The best state is kept; false:
+ * that is the one at hand. step: row updates of a round; left: how many are left, in and out. */
+static bool island_improve(hapi_island *is, uint32_t step, uint32_t *io_left, double *io_due)
+{
+  const bool exact = !(is->solver->coarse.energy2 > 0.0);
+  newton n = {.is = is, .least = *io_due, .due = *io_due, .step = step, .left = *io_left};
   hapi_island_save(is);
-  for (*out_better = false; falls && !is->settled && rounds < DAMPED_ROUNDS; ++rounds) {
-    hapi_island_solve(is);
-    double due = hapi_island_inspect(is, false);
-    falls = is->settled || hapi_island_rise(is, is->saved_impulse, is->saved_error) < 0.0;
-    if (falls) {
-      *io_due = due;
-      *out_better = true;
-      hapi_island_save(is);
-    }
+  while (!n.solved && has_time(&n)) {
+    double last = n.due;
+    round_make(&n);
+    is->softening *= !is->look.changed ? FIRMER : n.due > last ? SOFTER : 1.0 / SOFTER;
+    is->softening = hapi_max(is->softening, HAPI_FIRM);
   }
+  /* R slows what answers far less than its rows say, and has a say in where redundant ones push. */
+  const bool slow = n.least >= is->solver->tolerance;
+  if (n.solved && (slow || exact) && has_time(&n)) {
+    hapi_island_restore(is);
+    is->softening = HAPI_FIRM;
+    n.due = hapi_island_inspect(is, false);
+    round_make(&n);
+  }
+  is->softening = HAPI_SOFTENING;
   hapi_island_restore(is);
-  is->softening = FIRM;
-  return rounds * step;
+  if (n.outside) {
+    hapi_island_cut(is);
+  }
+  *io_due = n.least;
+  *io_left = n.left;
+  return n.better;
 }
 
 /* ---- islands about hubs ---- */
@@ -179,13 +206,6 @@ typedef struct hub_state {
   uint32_t left;         /* row updates */
   uint32_t step;         /* the same, of one step of the hubs */
 } hub_state;
-
-static void hubs_hold(const hapi_island *is, const hub_state *hubs)
-{
-  const hapi_solver *solver = is->solver;
-  uint32_t first = solver->body_count - solver->hub_count;
-  memcpy(solver->v[first], hubs->v, solver->hub_count * sizeof hubs->v[0]);
-}
 
 static bool touches_hub(const hapi_solver *solver, const hapi_row *row)
 {
@@ -234,28 +254,19 @@ static void leave_out(hapi_island *is)
 /* The active set of a leaf, with the hubs as they are told. */
 static void solve_leaf(hapi_island *is, hub_state *hubs)
 {
-  double best = hapi_island_inspect(is, false);
-  if (best < is->solver->tolerance || !hapi_island_gather(is) || is->count == 0) {
+  const double tolerance = is->solver->tolerance;
+  double due = hapi_island_inspect(is, false);
+  if (due < tolerance || !hapi_island_gather(is) || is->count == 0) {
     return;
   }
   uint32_t cost = hapi_island_plan(is);
   if (!hapi_island_place(is)) {
     return;
   }
-  hapi_island_save(is);
-  for (int round = 0; round < LEAF_ROUNDS && updates_take(hubs, cost) > 0; ++round) {
-    hapi_island_solve(is);
-    hubs_hold(is, hubs);
-    double due = hapi_island_inspect(is, false);
-    if (due < is->solver->tolerance) {
-      return;
-    }
-    if (due < best) {
-      best = due;
-      hapi_island_save(is);
-    }
+  (void)island_improve(is, cost, &hubs->left, &due);
+  if (due < tolerance) {
+    return;
   }
-  hapi_island_restore(is);
   (void)hapi_island_inspect(is, false);
   if (hubs->left < cost) {
     leave_out(is);
@@ -266,7 +277,7 @@ static void solve_leaves(hapi_island *is, const lists *all, uint16_t first_leaf,
 {
   hapi_row *rows = is->solver->rows;
   uint32_t first = is->first;
-  is->held = true;
+  is->held = (const double(*)[6])hubs->v;
   for (uint16_t leaf = first_leaf; leaf != HAPI_NO_BODY; leaf = all->next_leaf[leaf]) {
     uint32_t tail = all->leaf_tail[leaf];
     uint32_t after = rows[tail].next;
@@ -276,7 +287,7 @@ static void solve_leaves(hapi_island *is, const lists *all, uint16_t first_leaf,
     rows[tail].next = after;
   }
   is->first = first;
-  is->held = false;
+  is->held = NULL;
 }
 
 /* One step of the hubs, from the sets of the leaves. */
@@ -285,8 +296,12 @@ static void step_hubs(hapi_island *is, hub_state *hubs)
   const hapi_solver *solver = is->solver;
   uint32_t first = solver->body_count - solver->hub_count;
   hubs_release(is);
+  is->softening = HAPI_FIRM;
+  hapi_island_gains(is);
+  is->softening = HAPI_SOFTENING;
   hapi_island_save(is);
   hapi_island_solve(is);
+  hapi_island_cut(is);
   for (uint32_t i = 0; i < is->count; ++i) {
     if (hapi_is_hub(solver, is->body[i])) {
       double *v = hubs->v[is->body[i] - first];
@@ -341,7 +356,7 @@ static bool improve_hubs(hapi_island *is, const lists *all, uint16_t first_leaf,
       better = true;
       state_keep(is);
     }
-    hubs_hold(is, hubs);
+    memcpy(solver->v[first], hubs->v, solver->hub_count * sizeof hubs->v[0]);
   }
   go_back(is);
   return better;
@@ -354,7 +369,6 @@ static bool improve_hubs(hapi_island *is, const lists *all, uint16_t first_leaf,
 static uint32_t mechanism_improve(hapi_island *is, uint32_t step, uint32_t budget, double *io_due)
 {
   hapi_solver *solver = is->solver;
-  const uint32_t cost = INNER_ROUNDS * step;
   state_keep(is);
   uint32_t spent = hapi_island_reduce(is, step, budget);
   double due = spent > 0 ? hapi_island_inspect(is, false) : HUGE_VAL;
@@ -364,15 +378,11 @@ static uint32_t mechanism_improve(hapi_island *is, uint32_t step, uint32_t budge
   }
   *io_due = due;
   ++solver->direct_solves;
-  if (due >= solver->tolerance && cost <= budget - spent) {
-    state_keep(is);
-    spent += cost;
-    (void)island_improve(is, due, false, &due);
-    if (due < *io_due) {
-      *io_due = due;
-    } else {
-      go_back(is);
-    }
+  if (due >= solver->tolerance) {
+    uint32_t left = budget - spent;
+    is->softening = HAPI_FIRM; /* the rows with bounds are solved */
+    (void)island_improve(is, step, &left, io_due);
+    spent = budget - left;
   }
   if (*io_due < HAPI_UNSOLVED && solver->direct.end != HAPI_DIRECT_DEAR) {
     solver->direct.end = HAPI_DIRECT_REDUCED;
@@ -385,34 +395,11 @@ static uint32_t mechanism_improve(hapi_island *is, uint32_t step, uint32_t budge
 /* An island of one part; the cost in row updates. */
 static uint32_t solve_whole(hapi_island *is, uint32_t step, uint32_t budget, double *io_due)
 {
-  hapi_solver *solver = is->solver;
-  const uint32_t cost = INNER_ROUNDS * step;
-  const uint32_t damped_cost = DAMPED_ROUNDS * step;
-  bool damped = solver->direct.damped > 0;
-  bool better = false;
-  uint32_t spent = 0;
-  if (damped) {
-    --solver->direct.damped;
-    spent = island_damp(is, step, io_due, &better);
-    if (!better || *io_due > HAPI_COARSE) {
-      (void)hapi_island_inspect(is, false);
-    }
-  }
-  if (!better && cost <= budget - spent) {
-    bool last = 2 * (uint64_t)(budget - spent - cost) <= solver->update_budget;
-    better = island_improve(is, *io_due, last, io_due);
-    spent += cost;
-  }
-  solver->direct_solves += better;
-  uint32_t of_mechanism =
-      *io_due > HAPI_COARSE ? mechanism_improve(is, step, budget - spent, io_due) : 0;
-  spent += of_mechanism;
-  if (!damped && !better && of_mechanism == 0 && damped_cost <= budget - spent) {
-    spent += island_damp(is, step, io_due, &better);
-    solver->direct_solves += better;
-    solver->direct.damped = better ? DAMPED_RUNS : 0;
-  }
-  return spent;
+  uint32_t left = budget;
+  is->solver->direct_solves += island_improve(is, step, &left, io_due);
+  uint32_t spent = budget - left;
+  bool stays = *io_due > HAPI_COARSE;
+  return spent + (stays ? mechanism_improve(is, step, budget - spent, io_due) : 0);
 }
 
 /* One island; the cost in row updates. */
@@ -421,9 +408,8 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
   hapi_solver *solver = is->solver;
   /* With heavy bodies on light ones sweeps find far too small normal impulses and slide what should
    * stick; from sticking the set is found. Tried second, as the set from the warm start is mostly
-   * right, and again where neither leads to the end. Of packs it is the first, after 12 sweeps:
-   * what runs have left undone shows as a little sliding. */
-  bool sticking = solver->sweeps % 3 == 0;
+   * right. */
+  bool sticking = solver->direct.runs % 2 != 0;
   double due = hapi_island_inspect(is, sticking);
   uint32_t spent = 0;
   if (due < solver->tolerance) {
@@ -441,10 +427,9 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
   }
   uint16_t leaf = all->first_leaf[index];
   uint32_t step = hapi_island_plan(is);
-  uint32_t cost = INNER_ROUNDS * step;
   hub_state hubs = {.left = budget, .step = step};
   bool has_leaves = leaf != all->last_leaf[index] && solver->hub_count <= HUBS_MAX;
-  if (!hapi_island_place(is) || (has_leaves ? step : cost) > budget) {
+  if (!hapi_island_place(is) || step > budget) {
     solver->direct.end = HAPI_DIRECT_DEAR;
   } else if (has_leaves) {
     solver->direct_solves += improve_hubs(is, all, leaf, &hubs, &due);
@@ -470,8 +455,8 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
   islands_split(solver, &all);
   solver->direct.residual = 0.0;
   is.solver = solver;
-  is.held = false;
-  is.softening = FIRM;
+  is.held = NULL;
+  is.softening = HAPI_SOFTENING;
   is.gain = solver->work;
   is.error = is.gain + solver->row_count;
   is.saved_error = is.error + solver->row_count;

@@ -1,9 +1,12 @@
 /* SPDX-FileCopyrightText: hapode contributors
  * SPDX-License-Identifier: MIT */
 
-/* One round of an active-set method for each island of bodies that rows tie together. The impulses
- * at hand say which rows are free (inside their bounds) and which frictions slide (tied to their
- * normal); all others stay as they are. With e the errors of the free rows and R small,
+/* One round of Newton's method for each island of bodies that rows tie together. The impulses are
+ * those where  p = what the bounds leave of  p + e / d,  with e the error of a row and d its
+ * response. The right side has a kink at each bound, and on either side of it another derivative
+ * (semismooth Newton, or primal-dual active sets: Hintermueller, Ito, Kunisch 2002): rows inside
+ * their bounds are free, frictions outside slide, tied to their normal, all others are at a bound.
+ * With e the errors of the free rows and R small,
  *
  *   dv = sum of b_i dp_i,   dp_i = (e_i - j_i dv) / (softness_i + R_i)
  *   (I + sum of b_i j_i / (softness_i + R_i)) dv = sum of b_i e_i / (softness_i + R_i)
@@ -11,7 +14,8 @@
  * has six unknowns per body whatever the number of rows, and one 6x6 block per touching pair. R
  * makes redundant contacts (four of a box on a floor) well behaved: only the change is regularised,
  * so that what the null space holds from the warm start stays, and the next round takes what R has
- * left of the errors (method of multipliers). */
+ * left of the errors (method of multipliers). Nothing is cut on the way: of a set that cannot be,
+ * impulses out of their bounds say which rows are to be others. */
 
 #include "solver/island.h"
 
@@ -79,33 +83,33 @@ static uint32_t count_of(const hapi_body_set *set)
 
 /* ---- rows ---- */
 
-/* `sticking` takes the friction of all contacts that push for free. `at_bound`: it wants to
- * stay. */
-static void row_classify(hapi_island *is, uint32_t i, bool at_bound, double hi, bool sticking)
+/* wanted: what its error asks for, N s. */
+static void row_classify(hapi_island *is, hapi_row *row, double wanted, double lo, double hi,
+                         bool sticking)
 {
-  hapi_row *rows = is->solver->rows;
-  hapi_row *row = &rows[i];
+  const uint8_t state = row->state;
+  const bool may_tie = row->normal >= 0 && hi > 0.0;
   row->state = HAPI_ROW_FIXED;
-  if (!at_bound || (sticking && row->normal >= 0 && hi > 0.0)) {
+  if ((wanted > lo && wanted < hi) || (sticking && may_tie)) {
     row->state = HAPI_ROW_FREE;
-    is->gain[i] = 1.0 / (row->softness + is->softening * row->response);
-  } else if (row->normal >= 0 && hi > 0.0 && rows[row->normal].state == HAPI_ROW_FREE &&
-             hapi_friction_follows(rows, row)) {
+  } else if (may_tie && is->solver->rows[row->normal].state == HAPI_ROW_FREE &&
+             hapi_friction_follows(is->solver->rows, row)) {
     row->state = HAPI_ROW_TIED;
-    is->gain[i] = (row->impulse > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
+    is->look.changed |= wanted * row->impulse < 0.0;
   }
+  is->look.changed |= row->state != state;
   is->free_rows += row->state == HAPI_ROW_FREE;
   is->used_rows += row->state != HAPI_ROW_FIXED;
 }
 
 /* What a row of a ball that slides has more of softness: across the force F it goes with the slip
  * e, as the two are parallel, e_t = (|e| / F) F_t. */
-static double slip_softness(const hapi_island *is, const hapi_row *row, uint32_t index)
+static double slip_softness(const hapi_row *row)
 {
-  return 1.0 / is->gain[index] - row->softness - is->softening * row->response;
+  return row->coupling[1];
 }
 
-static void slide_ball(hapi_island *is, uint32_t first, double radius, const double wanted[3])
+static void slide_ball(const hapi_island *is, uint32_t first, double radius, const double wanted[3])
 {
   hapi_row *row = &is->solver->rows[first];
   double slip = 0.0;
@@ -115,8 +119,7 @@ static void slide_ball(hapi_island *is, uint32_t first, double radius, const dou
   }
   for (uint32_t i = 0; i < row->ball; ++i) {
     row[i].state = HAPI_ROW_SLIDING;
-    is->gain[first + i] =
-        1.0 / (fmax(slip, 0.0) / radius + row[i].softness + is->softening * row[i].response);
+    row[i].coupling[1] = fmax(slip, 0.0) / radius;
   }
 }
 
@@ -127,22 +130,18 @@ static double inspect_ball(hapi_island *is, uint32_t first, bool sticking, doubl
   hapi_row *row = &is->solver->rows[first];
   double radius = hapi_ball_radius(is->solver->rows, row);
   double wanted[3];
-  double norm2 = 0.0;
   bool slides;
   for (uint32_t i = 0; i < row->ball; ++i) {
     is->error[first + i] = row[i].inverse != 0.0 ? hapi_row_error(is->solver, &row[i]) : 0.0;
-    norm2 += row[i].impulse * row[i].impulse;
     row[i].state = HAPI_ROW_FIXED;
   }
   double due = hapi_ball_wanted(row, radius, is->error + first, wanted, &slides);
-  bool inside = !slides || norm2 < (1.0 - 1e-9) * radius * radius;
   for (uint32_t i = 0; i < row->ball; ++i) {
     double change = wanted[i] - row[i].impulse;
     *io_energy2 += change * change * row[i].response;
   }
-  for (uint32_t i = 0; i < row->ball && radius > 0.0 && (inside || sticking); ++i) {
+  for (uint32_t i = 0; i < row->ball && radius > 0.0 && (!slides || sticking); ++i) {
     row[i].state = HAPI_ROW_FREE;
-    is->gain[first + i] = 1.0 / (row[i].softness + is->softening * row[i].response);
     ++is->free_rows;
   }
   if (radius > 0.0 && row->state == HAPI_ROW_FIXED) {
@@ -161,11 +160,13 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
   double opening = 0.0;
   is->free_rows = 0;
   is->used_rows = 0;
+  is->look.changed = is->look.outside = false;
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = solver->rows[i].next) {
-    const hapi_row *row = &solver->rows[i];
+    hapi_row *row = &solver->rows[i];
     double lo;
     double hi;
     if (row->ball > 0 || row->round > 0) {
+      is->look.changed = is->look.outside = true; /* what slides there turns */
       double due = row->ball > 0 ? inspect_ball(is, i, sticking, &energy2) : 0.0;
       largest = due <= largest ? largest : due;
       continue;
@@ -174,17 +175,17 @@ double hapi_island_inspect(hapi_island *is, bool sticking)
     double p = row->impulse;
     is->error[i] = hapi_row_error(solver, row);
     double wanted = p + is->error[i] * row->inverse;
-    bool inside = (p > lo && p < hi) || (wanted > lo && wanted < hi);
     double change = fabs(hapi_clamp(wanted, lo, hi) - p);
     double due = change * row->response;
+    is->look.outside |= p < lo || p > hi;
     largest = due > largest ? due : largest;
     opening = lo == -HUGE_VAL && hi == HUGE_VAL && due > opening ? due : opening;
     energy2 += change * due;
     sum += due + is->error[i];
-    row_classify(is, i, !inside, hi, sticking);
+    row_classify(is, row, wanted, lo, hi, sticking);
   }
-  is->settled = largest < solver->coarse.largest && opening <= solver->coarse.opening &&
-                energy2 < SETTLED * solver->coarse.energy2;
+  is->look.settled = largest < solver->coarse.largest && opening <= solver->coarse.opening &&
+                     energy2 < SETTLED * solver->coarse.energy2;
   return largest + 0.0 * sum; /* NaN if one was: comparisons and cuts at bounds lose it */
 }
 
@@ -224,7 +225,7 @@ static int sliding_drives(const hapi_island *is, uint32_t index, drive out[SLIDI
   for (int i = 0; i < first->ball; ++i) {
     double across = first[i].impulse - along * first[i].coupling[0];
     double part = (&first[i] == row ? 1.0 : 0.0) - row->coupling[0] * first[i].coupling[0];
-    double slip = slip_softness(is, &first[i], at + (uint32_t)i);
+    double slip = slip_softness(&first[i]);
     out[1 + i] =
         (drive){&first[i], part * is->gain[index], is->error[at + (uint32_t)i] - slip * across};
   }
@@ -261,7 +262,8 @@ bool hapi_island_gather(hapi_island *is)
       continue;
     }
     last = &rows[i];
-    bool takes_b = hapi_row_moves_b(&rows[i]) && !(is->held && hapi_is_hub(is->solver, rows[i].b));
+    bool takes_b =
+        hapi_row_moves_b(&rows[i]) && !(is->held != NULL && hapi_is_hub(is->solver, rows[i].b));
     if ((hapi_row_moves_a(&rows[i]) && !add_body(is, rows[i].a)) ||
         (takes_b && !add_body(is, rows[i].b))) {
       return false;
@@ -416,9 +418,10 @@ static void matrix_assemble(hapi_island *is)
     }
   }
   hapi_pair_sum pair = {NULL};
+  const bool by_pairs = is->solver->packs.work != NULL; /* then there are inverse inertias */
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     const hapi_row *row = &rows[i];
-    if (row->triple == HAPI_TRIPLE_BY_MASS) {
+    if (by_pairs && row->triple == HAPI_TRIPLE_BY_MASS) {
       add_contact(is, i, &pair);
       i += 2; /* its frictions */
     } else if (row->state == HAPI_ROW_SLIDING) {
@@ -591,24 +594,30 @@ static void push_ball(hapi_island *is, uint32_t first)
   }
 }
 
-/* What the rows of dv ask for, cut at the bounds: a normal comes before its frictions. The
- * velocities are those of the impulses as they are now, from the saved ones, and not kept along: a
- * set of active rows that cannot be gives impulses so large that nothing of the velocities would be
- * left. */
+static void hubs_hold(const hapi_island *is)
+{
+  const hapi_solver *solver = is->solver;
+  if (is->held != NULL) {
+    memcpy(solver->v[solver->body_count - solver->hub_count], is->held,
+           solver->hub_count * sizeof *is->held);
+  }
+}
+
+/* What the rows of dv ask for: a normal comes before its frictions. The velocities are those of the
+ * impulses as they are now, from the saved ones, and not kept along: a set of active rows that
+ * cannot be gives impulses so large that nothing of the velocities would be left. */
 static void push_rows(hapi_island *is)
 {
   const hapi_row *rows = is->solver->rows;
   restore_velocities(is);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
-    double lo;
-    double hi;
     if (rows[i].ball > 0) {
       push_ball(is, i);
     } else if (rows[i].round == 0) {
-      hapi_row_bounds(rows, &rows[i], &lo, &hi);
-      push_to(is, i, hapi_clamp(row_asked(is, i), lo, hi));
+      push_to(is, i, row_asked(is, i));
     }
   }
+  hubs_hold(is);
 }
 
 void hapi_island_save(hapi_island *is)
@@ -649,7 +658,6 @@ void hapi_island_factor(hapi_island *is)
   matrix_factor(is);
 }
 
-/* Impulses of the rows that are free or tied now, cut at their bounds. */
 void hapi_island_solve(hapi_island *is)
 {
   hapi_island_factor(is);
@@ -657,24 +665,105 @@ void hapi_island_solve(hapi_island *is)
   push_rows(is);
 }
 
-/* One sweep: where a normal lets go, its frictions go as well, and that shows. */
-void hapi_island_settle(hapi_island *is)
+void hapi_island_solve_again(hapi_island *is)
+{
+  const hapi_row *rows = is->solver->rows;
+  memset(is->dv, 0, is->count * sizeof *is->dv);
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
+    HAPI_ASSERT(rows[i].state != HAPI_ROW_SLIDING);
+    if (rows[i].state != HAPI_ROW_FIXED) {
+      const drive d = drive_of(is, &rows[i], i);
+      add_to(is, is->local[rows[i].a], d.gain * d.error, rows[i].ba);
+      if (hapi_row_moves_b(&rows[i])) {
+        add_to(is, is->local[rows[i].b], d.gain * d.error, rows[i].bb);
+      }
+    }
+  }
+  hapi_island_substitute(is);
+  push_rows(is);
+}
+
+/* Its impulse per error; wanted: as for its state. */
+static double gain_of(const hapi_island *is, const hapi_row *row, double wanted)
+{
+  if (row->state == HAPI_ROW_TIED) {
+    return (wanted > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
+  }
+  double softness = row->softness + (row->state == HAPI_ROW_SLIDING ? slip_softness(row) : 0.0);
+  bool joins = row->normal < 0 && row->lo == -HUGE_VAL && row->hi == HUGE_VAL;
+  return 1.0 / (softness + (joins ? HAPI_FIRM : is->softening) * row->response);
+}
+
+void hapi_island_gains(hapi_island *is)
+{
+  const hapi_row *rows = is->solver->rows;
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
+    if (rows[i].state != HAPI_ROW_FIXED) {
+      is->gain[i] = gain_of(is, &rows[i], rows[i].impulse + is->error[i] * rows[i].inverse);
+    }
+  }
+}
+
+void hapi_island_bound(hapi_island *is)
 {
   hapi_row *rows = is->solver->rows;
+  bool moved = false;
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     hapi_row *row = &rows[i];
     double lo;
     double hi;
-    if (row->ball > 0) {
-      (void)hapi_ball_update(is->solver, row);
-    }
-    if (row->ball > 0 || row->round > 0) {
+    if (row->state == HAPI_ROW_FREE || row->ball > 0 || row->round > 0) {
       continue;
     }
     hapi_row_bounds(rows, row, &lo, &hi);
-    double wanted = row->impulse + hapi_row_error(is->solver, row) * row->inverse;
-    hapi_row_push(is->solver, row, hapi_clamp(wanted, lo, hi) - row->impulse);
+    double at = hapi_clamp(row->impulse + is->error[i] * row->inverse, lo, hi);
+    if (at != row->impulse) {
+      hapi_row_push(is->solver, row, at - row->impulse);
+      row->impulse = at;
+      moved = true;
+    }
   }
+  hubs_hold(is);
+  for (uint32_t i = is->first; moved && i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
+    is->error[i] = rows[i].inverse != 0.0 ? hapi_row_error(is->solver, &rows[i]) : 0.0;
+  }
+}
+
+static void cut_to(hapi_island *is, hapi_row *row, double p)
+{
+  if (p != row->impulse) {
+    hapi_row_push(is->solver, row, p - row->impulse);
+    row->impulse = p;
+  }
+}
+
+static void cut_ball(hapi_island *is, hapi_row *first)
+{
+  double radius = hapi_ball_radius(is->solver->rows, first);
+  double norm2 = 0.0;
+  for (uint32_t i = 0; i < first->ball; ++i) {
+    norm2 += first[i].impulse * first[i].impulse;
+  }
+  double share = norm2 > radius * radius ? radius / sqrt(norm2) : 1.0;
+  for (uint32_t i = 0; share < 1.0 && i < first->ball; ++i) {
+    cut_to(is, &first[i], share * first[i].impulse);
+  }
+}
+
+void hapi_island_cut(hapi_island *is)
+{
+  hapi_row *rows = is->solver->rows;
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
+    double lo;
+    double hi;
+    if (rows[i].ball > 0) {
+      cut_ball(is, &rows[i]);
+    } else if (rows[i].round == 0) {
+      hapi_row_bounds(rows, &rows[i], &lo, &hi);
+      cut_to(is, &rows[i], hapi_clamp(rows[i].impulse, lo, hi));
+    }
+  }
+  hubs_hold(is);
 }
 
 /* J, how much more energy the impulses at hand leave than these did: what the rows minimise

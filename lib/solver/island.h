@@ -14,6 +14,9 @@
 #define HAPI_ISLAND_BODIES 128 /* one bit each */
 #define HAPI_NO_BODY UINT16_MAX
 #define HAPI_NO_SOLVER_ROW UINT32_MAX
+/* R of island.c, relative to a row's own response: of rows with bounds at first, and the least */
+#define HAPI_SOFTENING 1e-4
+#define HAPI_FIRM 1e-8
 #define HAPI_ROW_ARRAYS 6u /* of doubles in the work, by row */
 
 /* hapi_row.state */
@@ -28,16 +31,23 @@ typedef struct hapi_body_set {
   uint64_t bits[2];
 } hapi_body_set;
 
+/* What the last inspection has seen. */
+typedef struct hapi_island_look {
+  bool settled; /* what is due may be left, of this island */
+  bool changed; /* the set of active rows is another one than before */
+  bool outside; /* impulses are out of their bounds */
+} hapi_island_look;
+
 typedef struct hapi_island {
   hapi_solver *solver;
-  bool held;        /* hubs keep the velocity that they have in v */
-  double softening; /* R, relative to a row's own response */
-  uint32_t first;   /* row; the others by hapi_row.next, in their order */
+  const double (*held)[6]; /* velocities that the hubs keep; NULL: they move */
+  double softening;        /* R of rows with bounds, relative to a row's own response */
+  uint32_t first;          /* row; the others by hapi_row.next, in their order */
   uint32_t free_rows;
   uint32_t used_rows; /* free or tied */
   uint32_t count;     /* bodies */
   uint32_t block_count;
-  bool settled; /* when last inspected: what is due may be left, of this island */
+  hapi_island_look look;
   uint16_t local[HAPI_SOLVER_BODIES]; /* body -> index in the island */
   uint16_t body[HAPI_ISLAND_BODIES];
   uint16_t pivot[HAPI_ISLAND_BODIES];     /* order of elimination */
@@ -86,8 +96,9 @@ static inline void hapi_unite(uint16_t *parent, uint32_t i, uint32_t j)
   parent[a > b ? a : b] = a > b ? b : a;
 }
 
-/* The states of the rows, for the next round; returns the largest correction due, m/s; NaN if one
- * is no number. `sticking` takes the friction of all contacts that push for free. */
+/* The states of the rows, for the next round: one is free where a step along its error would stay
+ * within its bounds, wherever its impulse is. `sticking` takes the friction of all contacts that
+ * push for free. Returns the largest correction due, m/s; NaN if one is no number. */
 double hapi_island_inspect(hapi_island *is, bool sticking);
 
 /* The bodies, but for hubs that are held; false: too many. */
@@ -102,16 +113,31 @@ bool hapi_island_place(hapi_island *is);
 void hapi_island_save(hapi_island *is);
 void hapi_island_restore(hapi_island *is);
 
-/* Impulses of the rows that are free or tied, cut at their bounds, from the saved ones. */
+/* Impulses of the rows that are free or tied, from the saved ones; they may be out of their
+ * bounds. */
 void hapi_island_solve(hapi_island *is);
 
-/* The two halves of it, without cuts: the matrix, and dv, what the errors of the rows that are free
- * or tied ask for; then dv out of such a right side. */
+/* The two halves of it: the matrix, and dv, what the errors of the rows that are free or tied ask
+ * for; then dv out of such a right side. */
 void hapi_island_factor(hapi_island *is);
+
+/* The other half once more, with the errors of the last inspect: of the same set of active rows the
+ * matrix is the same. */
+void hapi_island_solve_again(hapi_island *is);
+
+/* The other half once more, with the errors of the last inspect: of the same set of active rows the
+ * matrix is the same. */
+void hapi_island_solve_again(hapi_island *is);
 void hapi_island_substitute(hapi_island *is);
 
-/* One sweep: where a normal lets go, its frictions go as well, and that shows. */
-void hapi_island_settle(hapi_island *is);
+/* Before a round, after inspect: the gains; */
+void hapi_island_gains(hapi_island *is);
+
+/* then rows that are fixed or tied to where their bounds are, and the errors that this leaves. */
+void hapi_island_bound(hapi_island *is);
+
+/* All impulses cut at their bounds. */
+void hapi_island_cut(hapi_island *is);
 
 /* J, how much more energy the impulses at hand leave than these did: what the rows minimise when no
  * friction slides, a square function of the impulses, whose slope is the error. */
