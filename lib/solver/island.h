@@ -125,9 +125,6 @@ void hapi_island_factor(hapi_island *is);
  * matrix is the same. */
 void hapi_island_solve_again(hapi_island *is);
 
-/* The other half once more, with the errors of the last inspect: of the same set of active rows the
- * matrix is the same. */
-void hapi_island_solve_again(hapi_island *is);
 void hapi_island_substitute(hapi_island *is);
 
 /* Before a round, after inspect: the gains; */
