@@ -120,12 +120,11 @@ void hapi_island_solve(hapi_island *is);
 /* The two halves of it: the matrix, and dv, what the errors of the rows that are free or tied ask
  * for; then dv out of such a right side. */
 void hapi_island_factor(hapi_island *is);
+void hapi_island_substitute(hapi_island *is);
 
-/* The other half once more, with the errors of the last inspect: of the same set of active rows the
+/* A round once more, with the errors of the last inspection: of the same set of active rows the
  * matrix is the same. */
 void hapi_island_solve_again(hapi_island *is);
-
-void hapi_island_substitute(hapi_island *is);
 
 /* Before a round, after inspect: the gains; */
 void hapi_island_gains(hapi_island *is);
