@@ -774,6 +774,27 @@ TEST(what_may_stay_undone_saves_work_and_comes_to_rest)
   CHECK(5 * updates[1] < 4 * updates[0]);
 }
 
+/* Whoever allows few sweeps has the direct solve before they are used up. */
+TEST(few_sweeps_have_a_direct_solve)
+{
+  int unsettled = 0; /* runs that end with more due than may be left, and without a direct solve */
+  make_tower(8, 0.5);
+  s.solver.tolerance = 1e-9;
+  s.solver.coarse.energy2 = 1e-12;
+  s.solver.coarse.largest = HAPI_COARSE;
+  s.solver.update_budget = 100 * s.row_count;
+  s.solver.max_sweeps = 4;
+  for (int tick = 0; tick < 300; ++tick) {
+    load_slowly(0, tick);
+    solver_run();
+    unsettled += s.solver.sweeps == 4 && s.solver.direct_solves == 0 &&
+                 s.solver.swept.energy2 >= s.solver.coarse.energy2;
+    CHECK(s.solver.sweeps <= 4);
+  }
+  printf("# %d of 300 unsettled\n", unsettled);
+  CHECK(unsettled < 10); /* 165 if the sweeps that are not allowed were counted on */
+}
+
 TEST(an_unchanged_load_is_solved_at_once)
 {
   make_tower(5, 0.5);

@@ -113,7 +113,8 @@ typedef struct newton {
   bool outside;  /* and some of its impulses are out of their bounds */
 } newton;
 
-/* stays: the set of active rows did in the round. What is cut at a bound may open joints. */
+/* Saves the state at hand if it is the best so far. stays: the set of active rows is the one that
+ * the round began with. Cutting impulses at their bounds may open joints. */
 static void state_take(newton *n, bool stays)
 {
   hapi_island *is = n->is;

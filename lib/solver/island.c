@@ -690,8 +690,8 @@ static double gain_of(const hapi_island *is, const hapi_row *row, double wanted)
     return (wanted > 0.0 ? row->mu : -row->mu) * is->gain[row->normal];
   }
   double softness = row->softness + (row->state == HAPI_ROW_SLIDING ? slip_softness(row) : 0.0);
-  bool joins = row->normal < 0 && row->lo == -HUGE_VAL && row->hi == HUGE_VAL;
-  return 1.0 / (softness + (joins ? HAPI_FIRM : is->softening) * row->response);
+  double r = hapi_row_is_bounded(row) ? is->softening : HAPI_FIRM;
+  return 1.0 / (softness + r * row->response);
 }
 
 void hapi_island_gains(hapi_island *is)

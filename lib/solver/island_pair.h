@@ -112,15 +112,7 @@ static inline void hapi_pair_matrix(const hapi_pair_sum *in, double out[6][6], d
   }
 }
 
-/* 1/kg, of a body that answers by its mass: exactly as in its rows. */
-static inline double hapi_pair_mass(const double j[6], const double b[6])
-{
-  int k = fabs(j[0]) > fabs(j[1]) ? 0 : 1;
-  k = fabs(j[k]) > fabs(j[2]) ? k : 2;
-  return b[k] / j[k];
-}
-
-/* in = M^-1 in; all but the rows of the moments, which are by the inverse inertia. */
+/* io = M^-1 io, row by row: the first three by the mass, the others by the inverse inertia. */
 static inline void hapi_pair_answer(double mass, const double turn[9], double io[6][6])
 {
   double moments[3][6];
@@ -201,7 +193,7 @@ static inline void hapi_pair_enter(hapi_island *is, hapi_pair_sum *io)
   const uint16_t a = is->local[row->a];
   const uint16_t b = both ? is->local[row->b] : a;
   const double *turn = is->solver->packs.inverse_inertia[row->a];
-  double mass = hapi_pair_mass(row->ja, row->ba);
+  double mass = hapi_row_inverse_mass(row->ja, row->ba);
   if (both) {
     hapi_pair_way(row, way);
   }
@@ -212,7 +204,7 @@ static inline void hapi_pair_enter(hapi_island *is, hapi_pair_sum *io)
   if (both) {
     hapi_pair_to_b(way, s, asked);
     turn = is->solver->packs.inverse_inertia[row->b];
-    mass = hapi_pair_mass(row->jb, row->bb);
+    mass = hapi_row_inverse_mass(row->jb, row->bb);
     hapi_pair_answer(mass, turn, s);
     hapi_pair_put(s, way, is->blocks[is->block[b][a]], is->blocks[is->block[b][b]]);
     hapi_pair_ask(mass, turn, asked, is->dv[b]);

@@ -24,11 +24,6 @@
 #define ROUNDS 6
 #define ENOUGH 0.1 /* of the tolerance: the rows with bounds, as the joints are still to follow */
 
-static bool row_is_bounded(const hapi_row *row)
-{
-  return row->normal >= 0 || row->lo != -HUGE_VAL || row->hi != HUGE_VAL;
-}
-
 static uint16_t local_of_b(const hapi_island *is, const hapi_row *row)
 {
   return hapi_row_moves_b(row) ? is->local[row->b] : HAPI_NO_BODY;
@@ -62,7 +57,7 @@ static bool bounded_find(hapi_island *is, hapi_bounded *out)
   uint32_t joints = 0;
   out->count = 0;
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
-    const bool bounded = row_is_bounded(&rows[i]);
+    const bool bounded = hapi_row_is_bounded(&rows[i]);
     if (rows[i].ball > 0 || rows[i].round > 0 || (bounded && out->count == HAPI_BOUNDED_MOST)) {
       return false;
     }

@@ -53,14 +53,6 @@ static void lane_set_drives(const hapi_packs *packs, uint32_t place, const hapi_
   }
 }
 
-/* 1/kg, exactly as in the rows: from the largest part of the direction. */
-static double inverse_mass(const double j[6], const double b[6])
-{
-  int k = fabs(j[0]) > fabs(j[1]) ? 0 : 1;
-  k = fabs(j[k]) > fabs(j[2]) ? k : 2;
-  return b[k] / j[k];
-}
-
 /* The arm along the directions d of three rows, from their moments arm x d. Of left-handed
  * directions it is the opposite, and so are cross products with it. */
 static void arm_find(const hapi_row *row, bool of_b, double out[3])
@@ -110,10 +102,10 @@ static void bodies_fill(const hapi_packs *packs, hapi_pack *pack, uint32_t lane,
   double right[3];
   hapi_v3_cross(row[1].ja, row[2].ja, right);
   double sign = hapi_v3_dot(row[0].ja, right) < 0.0 ? -1.0 : 1.0;
-  pack->mass_a[lane] = inverse_mass(row->ja, row->ba);
+  pack->mass_a[lane] = hapi_row_inverse_mass(row->ja, row->ba);
   turn_fill(packs->inverse_inertia[row->a], pack->turn_a, lane);
   if (pack->paired) {
-    pack->mass_b[lane] = inverse_mass(row->jb, row->bb);
+    pack->mass_b[lane] = hapi_row_inverse_mass(row->jb, row->bb);
     turn_fill(packs->inverse_inertia[row->b], pack->turn_b, lane);
     arm_find(row, false, arm);
     arm_find(row, true, apart);

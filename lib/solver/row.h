@@ -3,6 +3,7 @@
 #ifndef HAPODE_SOLVER_ROW_H
 #define HAPODE_SOLVER_ROW_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -29,7 +30,8 @@ typedef struct hapi_row {
   double response; /* inner: 1 / inverse */
   double mu; /* normal >= 0: bounds are -mu (p - lo) .. mu (p - lo), of that row; may be HUGE_VAL */
   double coupling[2]; /* inner, of a friction: j.b of the rows before it of its contact; of one of a
-                         ball that slides: [0] its part of the force's direction */
+                         ball that slides: [0] its part of the force's direction, [1] the softness
+                         that the slip adds */
   double lo;          /* N s; may be -HUGE_VAL */
   double hi;          /* N s; may be HUGE_VAL. normal >= 0: a load that bounds go by at least, the
                          same of both frictions of a contact */
@@ -59,6 +61,21 @@ static inline bool hapi_row_moves_a(const hapi_row *row)
 static inline bool hapi_row_moves_b(const hapi_row *row)
 {
   return (row->moves & HAPI_MOVES_B) != 0;
+}
+
+/* Inverse mass, 1/kg, of a body that answers by its mass: from the largest part of a direction, to
+ * the last bit as in the row. */
+static inline double hapi_row_inverse_mass(const double j[6], const double b[6])
+{
+  int k = fabs(j[0]) > fabs(j[1]) ? 0 : 1;
+  k = fabs(j[k]) > fabs(j[2]) ? k : 2;
+  return b[k] / j[k];
+}
+
+/* False: of a joint that holds, whose impulse may be any. */
+static inline bool hapi_row_is_bounded(const hapi_row *row)
+{
+  return row->normal >= 0 || row->lo != -HUGE_VAL || row->hi != HUGE_VAL;
 }
 
 /* Of two contacts of the same bodies, exactly: of a patch they are, and of what was made at the
