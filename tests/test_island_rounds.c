@@ -116,14 +116,9 @@ static void problem_make(double tilt)
 static void round_ask(double (*out)[6], uint32_t counts[3])
 {
   static hapi_island is;
-  is = (hapi_island){.solver = &p.solver, .softening = DAMPED, .first = 0};
-  is.gain = p.work;
-  is.error = is.gain + p.solver.row_count;
-  is.saved_error = is.error + p.solver.row_count;
-  is.saved_impulse = is.saved_error + p.solver.row_count;
-  is.kept_error = is.saved_impulse + p.solver.row_count;
-  is.kept_impulse = is.kept_error + p.solver.row_count;
-  is.kept_v = (double(*)[6])(is.kept_impulse + p.solver.row_count);
+  hapi_island_begin(&is, &p.solver);
+  is.softening = DAMPED;
+  is.first = 0;
   REQUIRE(hapi_island_inspect(&is, false) > 0.0);
   memset(counts, 0, 3 * sizeof *counts);
   for (uint32_t i = 0; i < p.solver.row_count; ++i) {
@@ -137,7 +132,7 @@ static void round_ask(double (*out)[6], uint32_t counts[3])
   hapi_island_factor(&is);
   hapi_island_substitute(&is);
   for (uint32_t i = 0; i < is.count; ++i) {
-    memcpy(out[is.body[i]], is.dv[i], sizeof *out);
+    memcpy(out[is.body[i]], is.dv[is.body[i]], sizeof *out);
   }
 }
 

@@ -68,6 +68,18 @@ static inline hapi_four hapi_four_abs(hapi_four x)
   return _mm256_andnot_pd(_mm256_set1_pd(-0.0), x);
 }
 
+/* a / b */
+static inline hapi_four hapi_four_div(hapi_four a, hapi_four b)
+{
+  return _mm256_div_pd(a, b);
+}
+
+/* a where x < y, else b. */
+static inline hapi_four hapi_four_pick(hapi_four x, hapi_four y, hapi_four a, hapi_four b)
+{
+  return _mm256_blendv_pd(b, a, _mm256_cmp_pd(x, y, _CMP_LT_OQ));
+}
+
 /* Columns 0 to 5 of four vectors of six. */
 static inline void hapi_four_gather(const double *const rows[4], hapi_four out[6])
 {
@@ -108,6 +120,26 @@ static inline void hapi_four_scatter(const hapi_four in[6], double *const rows[4
   _mm_storeu_pd(rows[2] + 4, _mm256_extractf128_pd(even45, 1));
   _mm256_storeu_pd(rows[3], _mm256_permute2f128_pd(odd01, odd23, 0x31));
   _mm_storeu_pd(rows[3] + 4, _mm256_extractf128_pd(odd45, 1));
+}
+
+/* The same, added to what is there. */
+static inline void hapi_four_scatter_add(const hapi_four in[6], double *const rows[4])
+{
+  __m256d even01 = _mm256_unpacklo_pd(in[0], in[1]);
+  __m256d odd01 = _mm256_unpackhi_pd(in[0], in[1]);
+  __m256d even23 = _mm256_unpacklo_pd(in[2], in[3]);
+  __m256d odd23 = _mm256_unpackhi_pd(in[2], in[3]);
+  __m256d even45 = _mm256_unpacklo_pd(in[4], in[5]);
+  __m256d odd45 = _mm256_unpackhi_pd(in[4], in[5]);
+  const __m256d first[4] = {
+      _mm256_permute2f128_pd(even01, even23, 0x20), _mm256_permute2f128_pd(odd01, odd23, 0x20),
+      _mm256_permute2f128_pd(even01, even23, 0x31), _mm256_permute2f128_pd(odd01, odd23, 0x31)};
+  const __m128d last[4] = {_mm256_castpd256_pd128(even45), _mm256_castpd256_pd128(odd45),
+                           _mm256_extractf128_pd(even45, 1), _mm256_extractf128_pd(odd45, 1)};
+  for (int i = 0; i < 4; ++i) {
+    _mm256_storeu_pd(rows[i], _mm256_add_pd(_mm256_loadu_pd(rows[i]), first[i]));
+    _mm_storeu_pd(rows[i] + 4, _mm_add_pd(_mm_loadu_pd(rows[i] + 4), last[i]));
+  }
 }
 
 #else
@@ -165,6 +197,19 @@ static inline hapi_four hapi_four_abs(hapi_four x)
   return (hapi_four){hapi_two_abs(x.low), hapi_two_abs(x.high)};
 }
 
+/* a / b */
+static inline hapi_four hapi_four_div(hapi_four a, hapi_four b)
+{
+  return (hapi_four){hapi_two_div(a.low, b.low), hapi_two_div(a.high, b.high)};
+}
+
+/* a where x < y, else b. */
+static inline hapi_four hapi_four_pick(hapi_four x, hapi_four y, hapi_four a, hapi_four b)
+{
+  return (hapi_four){hapi_two_pick(x.low, y.low, a.low, b.low),
+                     hapi_two_pick(x.high, y.high, a.high, b.high)};
+}
+
 /* Columns 0 to 5 of four vectors of six. */
 static inline void hapi_four_gather(const double *const rows[4], hapi_four out[6])
 {
@@ -179,6 +224,19 @@ static inline void hapi_four_scatter(const hapi_four in[6], double *const rows[4
   for (int k = 0; k < 6; ++k) {
     hapi_two_split(in[k].low, &rows[0][k], &rows[1][k]);
     hapi_two_split(in[k].high, &rows[2][k], &rows[3][k]);
+  }
+}
+
+/* The same, added to what is there. */
+static inline void hapi_four_scatter_add(const hapi_four in[6], double *const rows[4])
+{
+  for (int k = 0; k < 6; ++k) {
+    double more[4];
+    hapi_two_split(in[k].low, &more[0], &more[1]);
+    hapi_two_split(in[k].high, &more[2], &more[3]);
+    for (int i = 0; i < 4; ++i) {
+      rows[i][k] += more[i];
+    }
   }
 }
 

@@ -70,6 +70,19 @@ static inline hapi_two hapi_two_abs(hapi_two x)
   return _mm_andnot_pd(_mm_set1_pd(-0.0), x);
 }
 
+/* a / b */
+static inline hapi_two hapi_two_div(hapi_two a, hapi_two b)
+{
+  return _mm_div_pd(a, b);
+}
+
+/* a where x < y, else b. */
+static inline hapi_two hapi_two_pick(hapi_two x, hapi_two y, hapi_two a, hapi_two b)
+{
+  const hapi_two less = _mm_cmplt_pd(x, y);
+  return _mm_or_pd(_mm_and_pd(less, a), _mm_andnot_pd(less, b));
+}
+
 /* The first one plus the second one. */
 static inline double hapi_two_sum(hapi_two x)
 {
@@ -137,6 +150,18 @@ static inline hapi_two hapi_two_min(hapi_two a, hapi_two b)
 static inline hapi_two hapi_two_abs(hapi_two x)
 {
   return vabsq_f64(x);
+}
+
+/* a / b */
+static inline hapi_two hapi_two_div(hapi_two a, hapi_two b)
+{
+  return vdivq_f64(a, b);
+}
+
+/* a where x < y, else b. */
+static inline hapi_two hapi_two_pick(hapi_two x, hapi_two y, hapi_two a, hapi_two b)
+{
+  return vbslq_f64(vcltq_f64(x, y), a, b);
 }
 
 /* The first one plus the second one. */
@@ -213,6 +238,19 @@ static inline hapi_two hapi_two_min(hapi_two a, hapi_two b)
 static inline hapi_two hapi_two_abs(hapi_two x)
 {
   return (hapi_two){fabs(x.first), fabs(x.second)};
+}
+
+/* a / b */
+static inline hapi_two hapi_two_div(hapi_two a, hapi_two b)
+{
+  return (hapi_two){a.first / b.first, a.second / b.second};
+}
+
+/* a where x < y, else b. */
+static inline hapi_two hapi_two_pick(hapi_two x, hapi_two y, hapi_two a, hapi_two b)
+{
+  return (hapi_two){x.first < y.first ? a.first : b.first,
+                    x.second < y.second ? a.second : b.second};
 }
 
 /* The first one plus the second one. */

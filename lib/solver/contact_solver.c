@@ -767,18 +767,6 @@ static bool direct_pays(const hapi_solver *solver, double rate, bool first, bool
           (first && cheap && !sweeps_suffice(solver, rate, LEAVE_SWEEPS)));
 }
 
-/* It goes by rows. */
-static uint32_t direct_run(hapi_solver *solver, uint32_t budget)
-{
-  if (!solver->packs.in_use) {
-    return hapi_direct_run(solver, budget);
-  }
-  hapi_packs_store(&solver->packs, solver->rows);
-  uint32_t spent = hapi_direct_run(solver, budget);
-  hapi_packs_load(&solver->packs, solver->rows);
-  return spent;
-}
-
 void hapi_solver_run(hapi_solver *solver)
 {
   HAPI_ASSERT(solver->hub_count <= solver->body_count);
@@ -853,7 +841,7 @@ void hapi_solver_run(hapi_solver *solver)
         direct_pays(solver, rate, dearest == 0, tried) &&
         (rounds < DIRECT_ROUNDS || rounds % DIRECT_ROUNDS == 0)) {
       uint32_t accepted = solver->direct_solves;
-      uint32_t spent = direct_run(solver, (uint32_t)left - cost);
+      uint32_t spent = hapi_direct_run(solver, (uint32_t)left - cost);
       updates_spend(solver, &left, spent);
       solver->direct.cost = spent;
       ++solver->direct.runs;

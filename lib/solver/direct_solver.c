@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "solver/island.h"
+#include "solver/island_packs.h"
 #include "solver/island_reduced.h"
 
 #define ROUNDS 6u      /* of an island */
@@ -307,7 +308,7 @@ static void step_hubs(hapi_island *is, hub_state *hubs)
     if (hapi_is_hub(solver, is->body[i])) {
       double *v = hubs->v[is->body[i] - first];
       memcpy(v, is->saved_v[i], sizeof is->saved_v[i]);
-      hapi_madd6(v, 1.0, is->dv[i]);
+      hapi_madd6(v, 1.0, is->dv[is->body[i]]);
     }
   }
 }
@@ -316,19 +317,19 @@ static void step_hubs(hapi_island *is, hub_state *hubs)
 static void state_keep(hapi_island *is)
 {
   const hapi_solver *solver = is->solver;
-  memcpy(is->kept_v, solver->v, solver->body_count * sizeof *solver->v);
+  memcpy(is->kept.v, solver->v, solver->body_count * sizeof *solver->v);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = solver->rows[i].next) {
-    is->kept_impulse[i] = solver->rows[i].impulse;
-    is->kept_error[i] = is->error[i];
+    is->kept.impulse[i] = solver->rows[i].impulse;
+    is->kept.error[i] = is->error[i];
   }
 }
 
 static void go_back(hapi_island *is)
 {
   const hapi_solver *solver = is->solver;
-  memcpy(solver->v, is->kept_v, solver->body_count * sizeof *solver->v);
+  memcpy(solver->v, is->kept.v, solver->body_count * sizeof *solver->v);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = solver->rows[i].next) {
-    solver->rows[i].impulse = is->kept_impulse[i];
+    solver->rows[i].impulse = is->kept.impulse[i];
   }
 }
 
@@ -352,7 +353,7 @@ static bool improve_hubs(hapi_island *is, const lists *all, uint16_t first_leaf,
       *io_due = due;
       return true;
     }
-    if (due < *io_due && hapi_island_rise(is, is->kept_impulse, is->kept_error) < 0.0) {
+    if (due < *io_due && hapi_island_rise(is, is->kept.impulse, is->kept.error) < 0.0) {
       *io_due = due;
       better = true;
       state_keep(is);
@@ -403,27 +404,38 @@ static uint32_t solve_whole(hapi_island *is, uint32_t step, uint32_t budget, dou
   return spent + (stays ? mechanism_improve(is, step, budget - spent, io_due) : 0);
 }
 
-/* One island; the cost in row updates. */
-static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, uint32_t budget)
+/* Whether there is anything to solve; sets the states of the rows. */
+static bool island_is_due(hapi_island *is, double *out_due)
 {
   hapi_solver *solver = is->solver;
   /* With heavy bodies on light ones sweeps find far too small normal impulses and slide what should
    * stick; from sticking the set is found. Tried second, as the set from the warm start is mostly
    * right. */
   bool sticking = solver->direct.runs % 2 != 0;
-  double due = hapi_island_inspect(is, sticking);
-  uint32_t spent = 0;
-  if (due < solver->tolerance) {
-    solver->direct.residual = fmax(solver->direct.residual, due);
-    return 0;
+  *out_due = hapi_island_inspect(is, sticking);
+  if (*out_due < solver->tolerance) {
+    solver->direct.residual = fmax(solver->direct.residual, *out_due);
+    return false;
   }
-  if (!isfinite(due)) { /* nothing can begin from it */
+  if (!isfinite(*out_due)) { /* nothing can begin from it */
     solver->direct.residual = HUGE_VAL;
-    return 0;
+    return false;
   }
   if (is->free_rows == 0 || is->free_rows > solver->direct_rows || !hapi_island_gather(is)) {
     solver->direct.end = is->free_rows > 0 ? HAPI_DIRECT_DEAR : solver->direct.end;
     solver->direct.residual = HUGE_VAL;
+    return false;
+  }
+  return true;
+}
+
+/* One island; the cost in row updates. */
+static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, uint32_t budget)
+{
+  hapi_solver *solver = is->solver;
+  double due;
+  uint32_t spent = 0;
+  if (!island_is_due(is, &due)) {
     return 0;
   }
   uint16_t leaf = all->first_leaf[index];
@@ -442,34 +454,90 @@ static uint32_t solve_island(hapi_island *is, const lists *all, uint32_t index, 
   return spent;
 }
 
+static uint32_t rows_run(hapi_solver *solver, hapi_island *is, uint32_t budget)
+{
+  lists all;
+  uint32_t spent = 0;
+  hapi_island_begin(is, solver);
+  islands_split(solver, &all);
+  for (uint32_t i = 0; i < solver->body_count; ++i) {
+    is->first = all.head[i];
+    if (is->first != HAPI_NO_SOLVER_ROW) {
+      spent += solve_island(is, &all, i, budget - spent);
+    }
+  }
+  return spent;
+}
+
+/* ---- packs ---- */
+
+/* The loose rows one after the other; false: there are joints, which need their mechanisms. */
+static bool chain_loose(hapi_island *is)
+{
+  hapi_solver *solver = is->solver;
+  is->first = HAPI_NO_SOLVER_ROW;
+  for (uint32_t run = hapi_loose_count(solver); run-- > 0;) {
+    const hapi_loose_rows at = hapi_loose_at(solver, run);
+    for (uint32_t i = at.end; i-- > at.first;) {
+      hapi_row *row = &solver->rows[i];
+      if (row->inverse != 0.0 && !hapi_row_is_bounded(row)) {
+        return false;
+      }
+      if (row->inverse != 0.0) {
+        row->next = is->first;
+        is->first = i;
+      }
+    }
+  }
+  return true;
+}
+
+/* All bodies are one island, and packed contacts stay where they are: a fourth of the time. False:
+ * that cannot be. */
+static bool packed_run(hapi_solver *solver, hapi_island *is, uint32_t budget, uint32_t *out_spent)
+{
+  double due;
+  hapi_island_begin(is, solver);
+  if (solver->hub_count > 0 || !chain_loose(is) || !hapi_packed_begin(is) ||
+      !hapi_island_gather(is)) {
+    return false;
+  }
+  *out_spent = 0;
+  if (!island_is_due(is, &due)) {
+    return true;
+  }
+  const uint32_t step = hapi_island_plan(is);
+  uint32_t left = budget;
+  if (!hapi_island_place(is) || step > budget) {
+    solver->direct.end = HAPI_DIRECT_DEAR;
+  } else {
+    solver->direct_solves += island_improve(is, step, &left, &due);
+    *out_spent = budget - left;
+  }
+  solver->direct.residual = fmax(solver->direct.residual, due);
+  return true;
+}
+
 uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
 {
   hapi_island is;
-  lists all;
+  hapi_packs *packs = &solver->packs;
   uint32_t spent = 0;
   solver->direct.end = HAPI_DIRECT_DONE;
   solver->direct.residual = HUGE_VAL;
   if (solver->body_count > HAPI_SOLVER_BODIES ||
-      solver->work_count < HAPI_ROW_ARRAYS * (size_t)solver->row_count) {
+      solver->work_count <
+          HAPI_ROW_ARRAYS * (size_t)solver->row_count + 6 * (size_t)solver->body_count) {
     return 0;
   }
-  islands_split(solver, &all);
   solver->direct.residual = 0.0;
-  is.solver = solver;
-  is.held = NULL;
-  is.softening = HAPI_SOFTENING;
-  is.gain = solver->work;
-  is.error = is.gain + solver->row_count;
-  is.saved_error = is.error + solver->row_count;
-  is.saved_impulse = is.saved_error + solver->row_count;
-  is.kept_error = is.saved_impulse + solver->row_count;
-  is.kept_impulse = is.kept_error + solver->row_count;
-  is.kept_v = (double(*)[6])(is.kept_impulse + solver->row_count);
-  for (uint32_t i = 0; i < solver->body_count; ++i) {
-    is.first = all.head[i];
-    if (is.first != HAPI_NO_SOLVER_ROW) {
-      spent += solve_island(&is, &all, i, budget - spent);
-    }
+  if (!packs->in_use) {
+    return rows_run(solver, &is, budget);
+  }
+  if (!packed_run(solver, &is, budget, &spent)) {
+    hapi_packs_store(packs, solver->rows);
+    spent = rows_run(solver, &is, budget);
+    hapi_packs_load(packs, solver->rows);
   }
   return spent;
 }

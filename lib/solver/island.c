@@ -22,84 +22,63 @@
 #include <string.h>
 
 #include "base/assert.h"
+#include "solver/island_matrix.h"
+#include "solver/island_packs.h"
 #include "solver/island_pair.h"
+#include "solver/island_triple.h"
 
 #define ROW_MADDS 300    /* to assemble, solve and check a row, in multiply-adds */
+#define PACKED_MADDS 800 /* the same of four contacts in a pack */
 #define SETTLED 0.25     /* of what may be left: islands add up, and rows say it one by one */
 #define MADDS_PER_ROW 36 /* multiply-adds in the time of one row update */
 
-/* ---- sets of bodies ---- */
-
-static bool set_has(const hapi_body_set *set, uint32_t i)
-{
-  return (set->bits[i / 64] >> i % 64 & 1) != 0;
-}
-
-static void set_add(hapi_body_set *set, uint32_t i)
-{
-  HAPI_ASSERT_INDEX(i, HAPI_ISLAND_BODIES);
-  set->bits[i / 64] |= (uint64_t)1 << i % 64;
-}
-
-static void set_drop(hapi_body_set *set, uint32_t i)
-{
-  set->bits[i / 64] &= ~((uint64_t)1 << i % 64);
-}
-
-static hapi_body_set set_both(const hapi_body_set *a, const hapi_body_set *b)
-{
-  return (hapi_body_set){{a->bits[0] & b->bits[0], a->bits[1] & b->bits[1]}};
-}
-
-static void add_all(hapi_body_set *set, const hapi_body_set *more)
-{
-  set->bits[0] |= more->bits[0];
-  set->bits[1] |= more->bits[1];
-}
-
-/* The first that is at `from` or after it; HAPI_ISLAND_BODIES: none. */
-static uint32_t next_in(const hapi_body_set *set, uint32_t from)
-{
-  for (uint32_t word = from / 64; word < 2; from = 64 * ++word) {
-    for (uint64_t bits = set->bits[word] >> from % 64; bits != 0; bits >>= 1, ++from) {
-      if ((bits & 1) != 0) {
-        return from;
-      }
-    }
-  }
-  return HAPI_ISLAND_BODIES;
-}
-
-static uint32_t count_of(const hapi_body_set *set)
-{
-  uint32_t count = 0;
-  for (int i = 0; i < 2; ++i) {
-    for (uint64_t bits = set->bits[i]; bits != 0; bits &= bits - 1) {
-      ++count;
-    }
-  }
-  return count;
-}
-
 /* ---- rows ---- */
 
+/* Sums over an inspection. */
+typedef struct inspection {
+  double largest;
+  double sum;
+  double energy2;
+  double opening;
+  uint32_t free;
+  uint32_t used;
+  bool sticking;
+  bool changed;
+  bool outside;
+} inspection;
+
 /* wanted: what its error asks for, N s. */
-static void row_classify(hapi_island *is, hapi_row *row, double wanted, double lo, double hi,
-                         bool sticking)
+static inline void row_classify(const hapi_row *rows, hapi_row *row, double wanted, double lo,
+                                double hi, inspection *io)
 {
-  const uint8_t state = row->state;
+  const uint8_t before = row->state;
   const bool may_tie = row->normal >= 0 && hi > 0.0;
-  row->state = HAPI_ROW_FIXED;
-  if ((wanted > lo && wanted < hi) || (sticking && may_tie)) {
-    row->state = HAPI_ROW_FREE;
-  } else if (may_tie && is->solver->rows[row->normal].state == HAPI_ROW_FREE &&
-             hapi_friction_follows(is->solver->rows, row)) {
-    row->state = HAPI_ROW_TIED;
-    is->look.changed |= wanted * row->impulse < 0.0;
+  uint8_t state = HAPI_ROW_FIXED;
+  if ((wanted > lo && wanted < hi) || (io->sticking && may_tie)) {
+    state = HAPI_ROW_FREE;
+  } else if (may_tie && rows[row->normal].state == HAPI_ROW_FREE &&
+             hapi_friction_follows(rows, row)) {
+    state = HAPI_ROW_TIED;
+    io->changed |= wanted * row->impulse < 0.0;
   }
-  is->look.changed |= row->state != state;
-  is->free_rows += row->state == HAPI_ROW_FREE;
-  is->used_rows += row->state != HAPI_ROW_FIXED;
+  row->state = state;
+  io->changed |= state != before;
+  io->free += state == HAPI_ROW_FREE;
+  io->used += state != HAPI_ROW_FIXED;
+}
+
+static inline void row_inspect(const hapi_row *rows, hapi_row *row, double error, double lo,
+                               double hi, inspection *io)
+{
+  const double p = row->impulse;
+  const double wanted = p + error * row->inverse;
+  const double change = fabs(hapi_clamp(wanted, lo, hi) - p);
+  const double due = change * row->response;
+  io->outside |= (p < lo) | (p > hi);
+  io->largest = hapi_max(due, io->largest);
+  io->energy2 += change * due;
+  io->sum += due + error;
+  row_classify(rows, row, wanted, lo, hi, io);
 }
 
 /* What a row of a ball that slides has more of softness: across the force F it goes with the slip
@@ -125,7 +104,7 @@ static void slide_ball(const hapi_island *is, uint32_t first, double radius, con
 
 /* The states of frictions that are one vector: free, or along the force and as large as the normal
  * lets it, while they turn with the slip. */
-static double inspect_ball(hapi_island *is, uint32_t first, bool sticking, double *io_energy2)
+static void ball_inspect(hapi_island *is, uint32_t first, inspection *io)
 {
   hapi_row *row = &is->solver->rows[first];
   double radius = hapi_ball_radius(is->solver->rows, row);
@@ -136,57 +115,92 @@ static double inspect_ball(hapi_island *is, uint32_t first, bool sticking, doubl
     row[i].state = HAPI_ROW_FIXED;
   }
   double due = hapi_ball_wanted(row, radius, is->error + first, wanted, &slides);
+  io->largest = due <= io->largest ? io->largest : due;
   for (uint32_t i = 0; i < row->ball; ++i) {
     double change = wanted[i] - row[i].impulse;
-    *io_energy2 += change * change * row[i].response;
+    io->energy2 += change * change * row[i].response;
   }
-  for (uint32_t i = 0; i < row->ball && radius > 0.0 && (!slides || sticking); ++i) {
+  for (uint32_t i = 0; i < row->ball && radius > 0.0 && (!slides || io->sticking); ++i) {
     row[i].state = HAPI_ROW_FREE;
-    ++is->free_rows;
+    ++io->free;
   }
   if (radius > 0.0 && row->state == HAPI_ROW_FIXED) {
     slide_ball(is, first, radius, wanted);
   }
-  is->used_rows += row->state != HAPI_ROW_FIXED ? row->ball : 0;
-  return due;
+  io->used += row->state != HAPI_ROW_FIXED ? row->ball : 0;
+}
+
+/* Of a normal and its two frictions. */
+static void triple_inspect(hapi_island *is, uint32_t first, inspection *io)
+{
+  hapi_row *rows = is->solver->rows;
+  hapi_row *r = &rows[first];
+  double *error = is->error + first;
+  inspection sums = *io;
+  double e[3];
+  hapi_triple_errors(is->solver, r, e);
+  row_inspect(rows, r, e[0], r->lo, r->hi, &sums);
+  const double load = hapi_friction_load(rows, &r[1]);
+  for (int i = 1; i < 3; ++i) {
+    const double most = hapi_friction_most(&r[i], load);
+    row_inspect(rows, &r[i], e[i], -most, most, &sums);
+  }
+  hapi_v3_copy(e, error);
+  *io = sums;
+}
+
+/* Of any other. */
+static void other_inspect(hapi_island *is, uint32_t index, inspection *io)
+{
+  hapi_row *row = &is->solver->rows[index];
+  double lo;
+  double hi;
+  hapi_row_bounds(is->solver->rows, row, &lo, &hi);
+  const double p = row->impulse;
+  is->error[index] = hapi_row_error(is->solver, row);
+  row_inspect(is->solver->rows, row, is->error[index], lo, hi, io);
+  if (lo == -HUGE_VAL && hi == HUGE_VAL) {
+    io->opening =
+        hapi_max(fabs(p + is->error[index] * row->inverse - p) * row->response, io->opening);
+  }
 }
 
 double hapi_island_inspect(hapi_island *is, bool sticking)
 {
   const hapi_solver *solver = is->solver;
-  double largest = 0.0;
-  double sum = 0.0;
-  double energy2 = 0.0;
-  double opening = 0.0;
-  is->free_rows = 0;
-  is->used_rows = 0;
-  is->look.changed = is->look.outside = false;
-  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = solver->rows[i].next) {
-    hapi_row *row = &solver->rows[i];
-    double lo;
-    double hi;
-    if (row->ball > 0 || row->round > 0) {
-      is->look.changed = is->look.outside = true; /* what slides there turns */
-      double due = row->ball > 0 ? inspect_ball(is, i, sticking, &energy2) : 0.0;
-      largest = due <= largest ? largest : due;
-      continue;
-    }
-    hapi_row_bounds(solver->rows, row, &lo, &hi);
-    double p = row->impulse;
-    is->error[i] = hapi_row_error(solver, row);
-    double wanted = p + is->error[i] * row->inverse;
-    double change = fabs(hapi_clamp(wanted, lo, hi) - p);
-    double due = change * row->response;
-    is->look.outside |= p < lo || p > hi;
-    largest = due > largest ? due : largest;
-    opening = lo == -HUGE_VAL && hi == HUGE_VAL && due > opening ? due : opening;
-    energy2 += change * due;
-    sum += due + is->error[i];
-    row_classify(is, row, wanted, lo, hi, sticking);
+  inspection sums = {.sticking = sticking};
+  if (is->packed.packs != NULL) {
+    hapi_pack_look look;
+    hapi_packed_inspect(is, sticking, &look);
+    sums.largest = look.largest;
+    sums.energy2 = look.energy2;
+    sums.sum = look.sum;
+    sums.free = look.free;
+    sums.changed = look.changed;
+    sums.outside = look.outside;
   }
-  is->look.settled = largest < solver->coarse.largest && opening <= solver->coarse.opening &&
-                     energy2 < SETTLED * solver->coarse.energy2;
-  return largest + 0.0 * sum; /* NaN if one was: comparisons and cuts at bounds lose it */
+  for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = solver->rows[i].next) {
+    const hapi_row *row = &solver->rows[i];
+    if (row->triple) {
+      triple_inspect(is, i, &sums);
+      i += 2; /* its frictions */
+    } else if (row->ball > 0 || row->round > 0) {
+      sums.changed = sums.outside = true; /* what slides there turns */
+      if (row->ball > 0) {
+        ball_inspect(is, i, &sums);
+      }
+    } else {
+      other_inspect(is, i, &sums);
+    }
+  }
+  is->free_rows = sums.free;
+  is->used_rows = sums.used;
+  is->look.changed = sums.changed;
+  is->look.outside = sums.outside;
+  is->look.settled = sums.largest < solver->coarse.largest &&
+                     sums.opening <= solver->coarse.opening &&
+                     sums.energy2 < SETTLED * solver->coarse.energy2;
+  return sums.largest + 0.0 * sums.sum; /* NaN if one was: comparisons and cuts at bounds lose it */
 }
 
 /* A row whose error drives another row's impulse, and how much. */
@@ -244,9 +258,37 @@ static bool add_body(hapi_island *is, uint32_t body)
     return false;
   }
   is->link[is->count] = (hapi_body_set){{0, 0}};
-  set_add(&is->link[is->count], is->count);
+  hapi_set_add(&is->link[is->count], is->count);
   is->body[is->count] = (uint16_t)body;
   is->local[body] = (uint16_t)is->count++;
+  return true;
+}
+
+static void link_bodies(hapi_island *is, uint32_t a, uint32_t b)
+{
+  const uint16_t i = is->local[a];
+  const uint16_t k = is->local[b];
+  if (i != HAPI_NO_BODY && k != HAPI_NO_BODY) {
+    hapi_set_add(&is->link[i], k);
+    hapi_set_add(&is->link[k], i);
+  }
+}
+
+static bool gather_packed(hapi_island *is, const hapi_packs *packs)
+{
+  for (uint32_t i = 0; i < packs->unit_count; ++i) {
+    const hapi_pack_unit *unit = &packs->units[i];
+    const hapi_packable *first = &packs->packables[unit->first];
+    if (first->place == HAPI_NO_PLACE) {
+      continue;
+    }
+    if (!add_body(is, first->a) || (unit->paired && !add_body(is, first->b))) {
+      return false;
+    }
+    if (unit->paired) {
+      link_bodies(is, first->a, first->b);
+    }
+  }
   return true;
 }
 
@@ -257,6 +299,9 @@ bool hapi_island_gather(hapi_island *is)
   const hapi_row *last = NULL;
   is->count = 0;
   memset(is->local, 0xff, is->solver->body_count * sizeof is->local[0]);
+  if (is->packed.packs != NULL && !gather_packed(is, is->packed.packs)) {
+    return false;
+  }
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     if (hapi_row_ties_same(&rows[i], last)) {
       continue;
@@ -271,15 +316,9 @@ bool hapi_island_gather(hapi_island *is)
   }
   last = NULL;
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
-    if (hapi_row_ties_same(&rows[i], last)) {
-      continue;
-    }
-    last = &rows[i];
-    uint16_t a = is->local[rows[i].a];
-    uint16_t b = is->local[rows[i].b];
-    if (a != HAPI_NO_BODY && b != HAPI_NO_BODY) {
-      set_add(&is->link[a], b);
-      set_add(&is->link[b], a);
+    if (!hapi_row_ties_same(&rows[i], last)) {
+      last = &rows[i];
+      link_bodies(is, rows[i].a, rows[i].b);
     }
   }
   return true;
@@ -291,8 +330,8 @@ static uint32_t least_linked(const hapi_island *is, const hapi_body_set *left)
   uint32_t best = 0;
   uint32_t best_degree = UINT32_MAX;
   for (uint32_t i = 0; i < is->count; ++i) {
-    hapi_body_set links = set_both(&is->link[i], left);
-    uint32_t degree = set_has(left, i) ? count_of(&links) : UINT32_MAX;
+    hapi_body_set links = hapi_set_both(&is->link[i], left);
+    uint32_t degree = hapi_set_has(left, i) ? hapi_set_count(&links) : UINT32_MAX;
     if (degree < best_degree) {
       best_degree = degree;
       best = i;
@@ -309,25 +348,26 @@ uint32_t hapi_island_plan(hapi_island *is)
 {
   hapi_body_set left = {{0, 0}};
   uint32_t madds = is->used_rows * ROW_MADDS;
+  madds += is->packed.packs != NULL ? is->packed.packs->contact_count * PACKED_MADDS : 0;
   for (uint32_t i = 0; i < is->count; ++i) {
-    set_add(&left, i);
+    hapi_set_add(&left, i);
   }
   for (uint32_t k = 0; k < is->count; ++k) {
     uint32_t p = least_linked(is, &left);
-    set_drop(&left, p);
+    hapi_set_drop(&left, p);
     is->pivot[k] = (uint16_t)p;
-    is->rest[p] = set_both(&is->link[p], &left);
-    uint32_t degree = count_of(&is->rest[p]);
+    is->rest[p] = hapi_set_both(&is->link[p], &left);
+    uint32_t degree = hapi_set_count(&is->rest[p]);
     madds += 216 * (1 + degree + degree * degree);
-    for (uint32_t i = next_in(&is->rest[p], 0); i < HAPI_ISLAND_BODIES;
-         i = next_in(&is->rest[p], i + 1)) {
-      add_all(&is->link[i], &is->rest[p]);
+    for (uint32_t i = hapi_set_next(&is->rest[p], 0); i < HAPI_ISLAND_BODIES;
+         i = hapi_set_next(&is->rest[p], i + 1)) {
+      hapi_set_add_all(&is->link[i], &is->rest[p]);
     }
   }
   is->block_count = 0;
   for (uint32_t i = 0; i < is->count; ++i) {
-    for (uint32_t j = next_in(&is->link[i], 0); j < HAPI_ISLAND_BODIES;
-         j = next_in(&is->link[i], j + 1)) {
+    for (uint32_t j = hapi_set_next(&is->link[i], 0); j < HAPI_ISLAND_BODIES;
+         j = hapi_set_next(&is->link[i], j + 1)) {
       is->block[i][j] = (uint16_t)is->block_count++;
     }
   }
@@ -356,20 +396,20 @@ static void add_row(hapi_island *is, uint16_t to, double s, const double b[6], c
   }
 }
 
-static void add_to(hapi_island *is, uint16_t local, double s, const double b[6])
+static void add_to(hapi_island *is, uint32_t body, double s, const double b[6])
 {
-  if (local != HAPI_NO_BODY) {
-    hapi_madd6(is->dv[local], s, b);
+  if (is->local[body] != HAPI_NO_BODY) {
+    hapi_madd6(is->dv[body], s, b);
   }
 }
 
 static inline void add_drive(hapi_island *is, const hapi_row *row, drive d)
 {
   add_row(is, is->local[row->a], d.gain, row->ba, d.from);
-  add_to(is, is->local[row->a], d.gain * d.error, row->ba);
+  add_to(is, row->a, d.gain * d.error, row->ba);
   if (hapi_row_moves_b(row)) {
     add_row(is, is->local[row->b], d.gain, row->bb, d.from);
-    add_to(is, is->local[row->b], d.gain * d.error, row->bb);
+    add_to(is, row->b, d.gain * d.error, row->bb);
   }
 }
 
@@ -411,7 +451,7 @@ static void matrix_assemble(hapi_island *is)
 {
   const hapi_row *rows = is->solver->rows;
   memset(is->blocks, 0, is->block_count * sizeof *is->blocks);
-  memset(is->dv, 0, is->count * sizeof *is->dv);
+  hapi_island_rest(is);
   for (uint32_t i = 0; i < is->count; ++i) {
     for (int k = 0; k < 36; k += 7) {
       is->blocks[is->block[i][i]][k] = 1.0;
@@ -431,107 +471,16 @@ static void matrix_assemble(hapi_island *is)
     }
   }
   hapi_pair_enter(is, &pair);
-}
-
-/* m = m^-1, by steps of Gauss and Jordan: row k by the pivot, the others freed of column k, in
- * which the inverse grows. No pivoting: such a block is 1 plus a product of positive definite
- * matrices as long as nothing slides, and what sliding spoils is not accepted. */
-static void block_invert(double m[36])
-{
-  for (int k = 0; k < 6; ++k) {
-    double pivot = 1.0 / m[7 * k];
-    m[7 * k] = 1.0;
-    for (int c = 0; c < 6; ++c) {
-      m[6 * k + c] *= pivot;
-    }
-    for (int i = 0; i < 6; ++i) {
-      if (i != k) {
-        double f = m[6 * i + k];
-        m[6 * i + k] = 0.0;
-        hapi_madd6(m + 6 * i, -f, m + 6 * k);
-      }
-    }
-  }
-}
-
-/* out = out - a b */
-static void multiply_sub(const double a[36], const double b[36], double out[36])
-{
-  for (int i = 0; i < 6; ++i) {
-    double *row = out + 6 * i;
-    hapi_two sums[3] = {hapi_two_load(row), hapi_two_load(row + 2), hapi_two_load(row + 4)};
-    for (int k = 0; k < 6; ++k) {
-      hapi_two share = hapi_two_all(-a[6 * i + k]);
-      for (int c = 0; c < 3; ++c) {
-        sums[c] = hapi_two_madd(sums[c], share, hapi_two_load(b + 6 * k + 2 * c));
-      }
-    }
-    for (int c = 0; c < 3; ++c) {
-      hapi_two_store(row + 2 * c, sums[c]);
-    }
-  }
-}
-
-/* y -= m x */
-static void apply_sub(const double m[36], const double x[6], double y[6])
-{
-  for (int i = 0; i < 6; ++i) {
-    y[i] -= hapi_dot6(m + 6 * i, x);
-  }
-}
-
-/* Block LU: diagonal blocks become their inverses, blocks below factors. */
-static void matrix_factor(hapi_island *is)
-{
-  for (uint32_t k = 0; k < is->count; ++k) {
-    uint16_t p = is->pivot[k];
-    const hapi_body_set *rest = &is->rest[p];
-    double *diagonal = is->blocks[is->block[p][p]];
-    block_invert(diagonal);
-    for (uint32_t i = next_in(rest, 0); i < HAPI_ISLAND_BODIES; i = next_in(rest, i + 1)) {
-      double *below = is->blocks[is->block[i][p]];
-      double l[36] = {0.0};
-      multiply_sub(below, diagonal, l);
-      for (int c = 0; c < 36; ++c) {
-        below[c] = l[c] = -l[c];
-      }
-      for (uint32_t j = next_in(rest, 0); j < HAPI_ISLAND_BODIES; j = next_in(rest, j + 1)) {
-        multiply_sub(l, is->blocks[is->block[p][j]], is->blocks[is->block[i][j]]);
-      }
-    }
-  }
-}
-
-/* dv: in right side, out solution */
-void hapi_island_substitute(hapi_island *is)
-{
-  for (uint32_t k = 0; k < is->count; ++k) {
-    uint16_t p = is->pivot[k];
-    const hapi_body_set *rest = &is->rest[p];
-    for (uint32_t i = next_in(rest, 0); i < HAPI_ISLAND_BODIES; i = next_in(rest, i + 1)) {
-      apply_sub(is->blocks[is->block[i][p]], is->dv[p], is->dv[i]);
-    }
-  }
-  for (uint32_t k = is->count; k-- > 0;) {
-    uint16_t p = is->pivot[k];
-    const hapi_body_set *rest = &is->rest[p];
-    double y[6];
-    memcpy(y, is->dv[p], sizeof y);
-    for (uint32_t j = next_in(rest, 0); j < HAPI_ISLAND_BODIES; j = next_in(rest, j + 1)) {
-      apply_sub(is->blocks[is->block[p][j]], is->dv[j], y);
-    }
-    const double *inverse = is->blocks[is->block[p][p]];
-    for (int i = 0; i < 6; ++i) {
-      is->dv[p][i] = hapi_dot6(inverse + 6 * i, y);
-    }
+  if (is->packed.packs != NULL) {
+    hapi_packed_assemble(is);
   }
 }
 
 /* ---- one round ---- */
 
-static double row_moved(const hapi_island *is, uint16_t local, const double j[6])
+static double row_moved(const hapi_island *is, uint32_t body, const double j[6])
 {
-  return local == HAPI_NO_BODY ? 0.0 : hapi_dot6(j, is->dv[local]);
+  return is->local[body] == HAPI_NO_BODY ? 0.0 : hapi_dot6(j, is->dv[body]);
 }
 
 static void restore_velocities(hapi_island *is)
@@ -543,9 +492,9 @@ static void restore_velocities(hapi_island *is)
 
 static inline double drive_answer(const hapi_island *is, drive d)
 {
-  double w = row_moved(is, is->local[d.from->a], d.from->ja);
+  double w = row_moved(is, d.from->a, d.from->ja);
   if (hapi_row_moves_b(d.from)) {
-    w += row_moved(is, is->local[d.from->b], d.from->jb);
+    w += row_moved(is, d.from->b, d.from->jb);
   }
   return d.gain * (d.error - w);
 }
@@ -603,6 +552,35 @@ static void hubs_hold(const hapi_island *is)
   }
 }
 
+/* none: zeros, for a body that stands; what is written there is lost. */
+static double *dv_of(const hapi_island *is, uint32_t body, double none[6])
+{
+  memset(none, 0, 6 * sizeof *none);
+  return is->local[body] == HAPI_NO_BODY ? none : is->dv[body];
+}
+
+/* The three rows of a contact, which answer to their own errors or to the normal's. */
+static void push_triple(hapi_island *is, uint32_t first)
+{
+  const hapi_solver *solver = is->solver;
+  hapi_row *r = &solver->rows[first];
+  const double *saved = is->saved_impulse + first;
+  const double *gain = is->gain + first;
+  const double *error = is->error + first;
+  double w[3];
+  double change[3];
+  double none[2][6];
+  hapi_triple_speeds(r, dv_of(is, r->a, none[0]), dv_of(is, r->b, none[1]), w);
+  for (int i = 0; i < 3; ++i) {
+    const int from = r[i].state == HAPI_ROW_TIED ? 0 : i;
+    const double asked = gain[i] * (error[from] - w[from]);
+    const double p = r[i].state == HAPI_ROW_FIXED ? r[i].impulse : r[i].impulse + asked;
+    change[i] = p - saved[i];
+    r[i].impulse = p;
+  }
+  hapi_triple_push(r, change, solver->v[r->a], solver->v[r->b]);
+}
+
 /* What the rows of dv ask for: a normal comes before its frictions. The velocities are those of the
  * impulses as they are now, from the saved ones, and not kept along: a set of active rows that
  * cannot be gives impulses so large that nothing of the velocities would be left. */
@@ -611,13 +589,19 @@ static void push_rows(hapi_island *is)
   const hapi_row *rows = is->solver->rows;
   restore_velocities(is);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
-    if (rows[i].ball > 0) {
+    if (rows[i].triple) {
+      push_triple(is, i);
+      i += 2; /* its frictions */
+    } else if (rows[i].ball > 0) {
       push_ball(is, i);
     } else if (rows[i].round == 0) {
       push_to(is, i, row_asked(is, i));
     }
   }
   hubs_hold(is);
+  if (is->packed.packs != NULL) {
+    hapi_packed_answer(is);
+  }
 }
 
 void hapi_island_save(hapi_island *is)
@@ -629,6 +613,9 @@ void hapi_island_save(hapi_island *is)
   for (uint32_t i = 0; i < is->count; ++i) {
     memcpy(is->saved_v[i], is->solver->v[is->body[i]], sizeof is->saved_v[i]);
   }
+  if (is->packed.packs != NULL) {
+    hapi_packed_save(is);
+  }
 }
 
 void hapi_island_restore(hapi_island *is)
@@ -637,25 +624,54 @@ void hapi_island_restore(hapi_island *is)
     is->solver->rows[i].impulse = is->saved_impulse[i];
   }
   restore_velocities(is);
+  if (is->packed.packs != NULL) {
+    hapi_packed_restore(is);
+  }
 }
 
-/* Places the arrays in the work; false if they do not fit. */
+void hapi_island_begin(hapi_island *is, hapi_solver *solver)
+{
+  const uint32_t rows = solver->row_count;
+  is->solver = solver;
+  is->held = NULL;
+  is->packed.packs = NULL;
+  is->softening = HAPI_SOFTENING;
+  is->gain = solver->work;
+  is->error = is->gain + rows;
+  is->saved_error = is->error + rows;
+  is->saved_impulse = is->saved_error + rows;
+  is->kept.error = is->saved_impulse + rows;
+  is->kept.impulse = is->kept.error + rows;
+  is->kept.v = (double(*)[6])(is->kept.impulse + rows);
+  is->free_work = (double *)(is->kept.v + solver->body_count);
+}
+
+/* Packs look at the lanes that they do not use, too. */
+void hapi_island_rest(hapi_island *is)
+{
+  if (is->packed.packs != NULL) {
+    memset(is->dv, 0, is->solver->body_count * sizeof *is->dv);
+    return;
+  }
+  for (uint32_t i = 0; i < is->count; ++i) {
+    memset(is->dv[is->body[i]], 0, sizeof *is->dv);
+  }
+}
+
 bool hapi_island_place(hapi_island *is)
 {
-  size_t rows = is->solver->row_count;
-  size_t need = HAPI_ROW_ARRAYS * rows + 6 * (size_t)is->solver->body_count +
-                12 * (size_t)is->count + 36 * (size_t)is->block_count;
-  double *at = (double *)(is->kept_v + is->solver->body_count);
-  is->saved_v = (double(*)[6])at;
+  size_t before = (size_t)(is->free_work - is->solver->work);
+  size_t need = 6 * ((size_t)is->count + is->solver->body_count) + 36 * (size_t)is->block_count;
+  is->saved_v = (double(*)[6])is->free_work;
   is->dv = is->saved_v + is->count;
-  is->blocks = (double(*)[36])(at + 12 * is->count);
-  return need <= is->solver->work_count;
+  is->blocks = (double(*)[36])(is->dv + is->solver->body_count);
+  return before + need <= is->solver->work_count;
 }
 
 void hapi_island_factor(hapi_island *is)
 {
   matrix_assemble(is);
-  matrix_factor(is);
+  hapi_island_decompose(is);
 }
 
 void hapi_island_solve(hapi_island *is)
@@ -665,19 +681,40 @@ void hapi_island_solve(hapi_island *is)
   push_rows(is);
 }
 
+/* What the errors of a contact ask for. */
+static void ask_triple(hapi_island *is, uint32_t first)
+{
+  const hapi_row *r = &is->solver->rows[first];
+  const double *gain = is->gain + first;
+  const double *error = is->error + first;
+  double asked[3];
+  double none[2][6];
+  for (int i = 0; i < 3; ++i) {
+    const int from = r[i].state == HAPI_ROW_TIED ? 0 : i;
+    asked[i] = r[i].state == HAPI_ROW_FIXED ? 0.0 : gain[i] * error[from];
+  }
+  hapi_triple_push(r, asked, dv_of(is, r->a, none[0]), dv_of(is, r->b, none[1]));
+}
+
 void hapi_island_solve_again(hapi_island *is)
 {
   const hapi_row *rows = is->solver->rows;
-  memset(is->dv, 0, is->count * sizeof *is->dv);
+  hapi_island_rest(is);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     HAPI_ASSERT(rows[i].state != HAPI_ROW_SLIDING);
-    if (rows[i].state != HAPI_ROW_FIXED) {
+    if (rows[i].triple) {
+      ask_triple(is, i);
+      i += 2; /* its frictions */
+    } else if (rows[i].state != HAPI_ROW_FIXED) {
       const drive d = drive_of(is, &rows[i], i);
-      add_to(is, is->local[rows[i].a], d.gain * d.error, rows[i].ba);
+      add_to(is, rows[i].a, d.gain * d.error, rows[i].ba);
       if (hapi_row_moves_b(&rows[i])) {
-        add_to(is, is->local[rows[i].b], d.gain * d.error, rows[i].bb);
+        add_to(is, rows[i].b, d.gain * d.error, rows[i].bb);
       }
     }
+  }
+  if (is->packed.packs != NULL) {
+    hapi_packed_ask(is);
   }
   hapi_island_substitute(is);
   push_rows(is);
@@ -702,6 +739,9 @@ void hapi_island_gains(hapi_island *is)
       is->gain[i] = gain_of(is, &rows[i], rows[i].impulse + is->error[i] * rows[i].inverse);
     }
   }
+  if (is->packed.packs != NULL) {
+    hapi_packed_gains(is);
+  }
 }
 
 void hapi_island_bound(hapi_island *is)
@@ -724,8 +764,19 @@ void hapi_island_bound(hapi_island *is)
     }
   }
   hubs_hold(is);
+  if (is->packed.packs != NULL) {
+    moved = hapi_packed_bound(is) || moved;
+  }
   for (uint32_t i = is->first; moved && i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
-    is->error[i] = rows[i].inverse != 0.0 ? hapi_row_error(is->solver, &rows[i]) : 0.0;
+    if (rows[i].triple) {
+      hapi_triple_errors(is->solver, &rows[i], is->error + i);
+      i += 2; /* its frictions */
+    } else {
+      is->error[i] = rows[i].inverse != 0.0 ? hapi_row_error(is->solver, &rows[i]) : 0.0;
+    }
+  }
+  if (moved && is->packed.packs != NULL) {
+    hapi_packed_miss(is);
   }
 }
 
@@ -764,6 +815,9 @@ void hapi_island_cut(hapi_island *is)
     }
   }
   hubs_hold(is);
+  if (is->packed.packs != NULL) {
+    hapi_packed_cut(is);
+  }
 }
 
 /* J, how much more energy the impulses at hand leave than these did: what the rows minimise

@@ -200,14 +200,14 @@ static inline void hapi_pair_enter(hapi_island *is, hapi_pair_sum *io)
   memcpy(of_a, s, sizeof of_a);
   hapi_pair_answer(mass, turn, of_a);
   hapi_pair_put(of_a, way, is->blocks[is->block[a][a]], both ? is->blocks[is->block[a][b]] : NULL);
-  hapi_pair_ask(mass, turn, asked, is->dv[a]);
+  hapi_pair_ask(mass, turn, asked, is->dv[row->a]);
   if (both) {
     hapi_pair_to_b(way, s, asked);
     turn = is->solver->packs.inverse_inertia[row->b];
     mass = hapi_row_inverse_mass(row->jb, row->bb);
     hapi_pair_answer(mass, turn, s);
     hapi_pair_put(s, way, is->blocks[is->block[b][a]], is->blocks[is->block[b][b]]);
-    hapi_pair_ask(mass, turn, asked, is->dv[b]);
+    hapi_pair_ask(mass, turn, asked, is->dv[row->b]);
   }
 }
 

@@ -34,10 +34,10 @@ static void answer_push(hapi_island *is, const hapi_row *row, double impulse)
   const uint16_t a = is->local[row->a];
   const uint16_t b = local_of_b(is, row);
   if (a != HAPI_NO_BODY) {
-    hapi_madd6(is->dv[a], impulse, row->ba);
+    hapi_madd6(is->dv[row->a], impulse, row->ba);
   }
   if (b != HAPI_NO_BODY) {
-    hapi_madd6(is->dv[b], impulse, row->bb);
+    hapi_madd6(is->dv[row->b], impulse, row->bb);
   }
 }
 
@@ -45,8 +45,8 @@ static double answer_along(const hapi_island *is, const hapi_row *row)
 {
   const uint16_t a = is->local[row->a];
   const uint16_t b = local_of_b(is, row);
-  return (a != HAPI_NO_BODY ? hapi_dot6(row->ja, is->dv[a]) : 0.0) +
-         (b != HAPI_NO_BODY ? hapi_dot6(row->jb, is->dv[b]) : 0.0);
+  return (a != HAPI_NO_BODY ? hapi_dot6(row->ja, is->dv[row->a]) : 0.0) +
+         (b != HAPI_NO_BODY ? hapi_dot6(row->jb, is->dv[row->b]) : 0.0);
 }
 
 /* Joints are free, all other rows fixed. False: no mechanism, too many rows, or frictions that are
@@ -84,7 +84,7 @@ static void answers_find(hapi_island *is, hapi_bounded *b)
 {
   const uint32_t n = b->count;
   for (uint32_t k = 0; k < n; ++k) {
-    memset(is->dv, 0, is->count * sizeof *is->dv);
+    hapi_island_rest(is);
     answer_push(is, &b->rows[b->row[k]], 1.0);
     hapi_island_substitute(is);
     for (uint32_t i = 0; i <= k; ++i) {
@@ -99,7 +99,7 @@ static void answers_find(hapi_island *is, hapi_bounded *b)
 static void errors_find(hapi_island *is, hapi_bounded *b)
 {
   const hapi_row *rows = is->solver->rows;
-  memset(is->dv, 0, is->count * sizeof *is->dv);
+  hapi_island_rest(is);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     is->error[i] = hapi_row_error(is->solver, &rows[i]);
     if (rows[i].state == HAPI_ROW_FREE) {
@@ -116,7 +116,7 @@ static void errors_find(hapi_island *is, hapi_bounded *b)
 static void joints_close(hapi_island *is)
 {
   hapi_row *rows = is->solver->rows;
-  memset(is->dv, 0, is->count * sizeof *is->dv);
+  hapi_island_rest(is);
   for (uint32_t i = is->first; i != HAPI_NO_SOLVER_ROW; i = rows[i].next) {
     const bool joint = rows[i].state == HAPI_ROW_FREE;
     answer_push(is, &rows[i],

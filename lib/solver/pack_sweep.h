@@ -8,6 +8,8 @@
 #include "solver/pack_aggregate.h"
 #include "solver/pack_blocks.h"
 #include "solver/pack_lanes.h"
+#include "solver/pack_matrix.h"
+#include "solver/pack_newton.h"
 #include "solver/pack_rays.h"
 
 typedef struct lanes_corrections {

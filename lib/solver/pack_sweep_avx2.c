@@ -16,8 +16,9 @@
 #endif
 #include "solver/pack_sweep.h"
 
-static const hapi_pack_work wide = {packs_couple, packs_push,      packs_sweep,
-                                    way_go_on,    packs_aggregate, packs_ray};
+static const hapi_pack_work wide = {
+    packs_couple, packs_push,  packs_sweep, way_go_on, packs_aggregate, packs_ray,   packs_inspect,
+    packs_miss,   packs_gains, packs_cut,   packs_ask, packs_assemble,  packs_answer};
 #ifdef __clang__
 #pragma clang attribute pop
 #else

@@ -115,6 +115,34 @@ struct hapi_aggregate; /* solver/aggregate.h */
 struct hapi_aggregate_row;
 struct hapi_packs;
 
+/* Of direct solves, by contact: rows and lanes (island_packs.h). */
+typedef struct hapi_pack_newton {
+  double (*state)[3][HAPI_LANES]; /* 0 fixed, 1 free, 2 tied to its normal */
+  double (*gain)[3][HAPI_LANES];
+  double (*error)[3][HAPI_LANES];
+  double (*saved)[3][HAPI_LANES]; /* impulses */
+} hapi_pack_newton;
+
+/* What an inspection has seen, see island.h. */
+typedef struct hapi_pack_look {
+  double largest;
+  double energy2;
+  double sum; /* no number, if one of the rows' was */
+  uint32_t free;
+  uint32_t used;
+  bool changed;
+  bool outside;
+} hapi_pack_look;
+
+/* The 6x6 blocks of a matrix that a pack's lanes add to: of the bodies that answer, and those that
+ * move. */
+typedef struct hapi_pack_targets {
+  double *aa[HAPI_LANES];
+  double *ab[HAPI_LANES]; /* this and the next two: where b responds */
+  double *ba[HAPI_LANES];
+  double *bb[HAPI_LANES];
+} hapi_pack_targets;
+
 /* How the packs are worked on; by what the processor can, with the same bits. */
 typedef struct hapi_pack_work {
   /* Sets the blocks of packs that are stale. */
@@ -129,6 +157,23 @@ typedef struct hapi_pack_work {
   /* Of one pack. */
   void (*ray)(const struct hapi_packs *packs, uint32_t index, double (*free)[6], double (*v)[6],
               hapi_pack_ray *out);
+  /* Of direct solves, see island.h: states and errors; */
+  void (*inspect)(const struct hapi_packs *packs, const hapi_pack_newton *newton, double (*v)[6],
+                  bool sticking, hapi_pack_look *out);
+  /* errors alone; */
+  void (*miss)(const struct hapi_packs *packs, double (*v)[6], double (*out)[3][HAPI_LANES]);
+  void (*gains)(const struct hapi_packs *packs, const hapi_pack_newton *newton, double softening);
+  /* impulses at their bounds, of rows that are not free, or newton NULL, of all; returns how much
+   * they changed, N s; */
+  double (*cut)(const struct hapi_packs *packs, const hapi_pack_newton *newton, double (*v)[6]);
+  /* the right side, added to dv by body; */
+  void (*ask)(const struct hapi_packs *packs, const hapi_pack_newton *newton, double (*dv)[6]);
+  /* the matrix, of one pack; */
+  void (*assemble)(const struct hapi_packs *packs, const hapi_pack_newton *newton, uint32_t index,
+                   const hapi_pack_targets *to);
+  /* impulses from the saved ones and from dv by body. v: with the saved ones. */
+  void (*answer)(const struct hapi_packs *packs, const hapi_pack_newton *newton, double (*dv)[6],
+                 double (*v)[6]);
 } hapi_pack_work;
 
 /* What is known of the rows. */
