@@ -492,8 +492,8 @@ static bool chain_loose(hapi_island *is)
   return true;
 }
 
-/* All bodies are one island, and packed contacts stay where they are: a fourth of the time. False:
- * that cannot be. */
+/* All bodies are one island, and packed contacts stay in their packs, which takes half the time.
+ * False: nothing was done, as it cannot be, or is too much at once; islands one by one may do. */
 static bool packed_run(hapi_solver *solver, hapi_island *is, uint32_t budget, uint32_t *out_spent)
 {
   double due;
@@ -504,16 +504,15 @@ static bool packed_run(hapi_solver *solver, hapi_island *is, uint32_t budget, ui
   }
   *out_spent = 0;
   if (!island_is_due(is, &due)) {
-    return true;
+    return solver->direct.end != HAPI_DIRECT_DEAR;
   }
   const uint32_t step = hapi_island_plan(is);
   uint32_t left = budget;
   if (!hapi_island_place(is) || step > budget) {
-    solver->direct.end = HAPI_DIRECT_DEAR;
-  } else {
-    solver->direct_solves += island_improve(is, step, &left, &due);
-    *out_spent = budget - left;
+    return false;
   }
+  solver->direct_solves += island_improve(is, step, &left, &due);
+  *out_spent = budget - left;
   solver->direct.residual = fmax(solver->direct.residual, due);
   return true;
 }
@@ -535,6 +534,8 @@ uint32_t hapi_direct_run(hapi_solver *solver, uint32_t budget)
     return rows_run(solver, &is, budget);
   }
   if (!packed_run(solver, &is, budget, &spent)) {
+    solver->direct.end = HAPI_DIRECT_DONE;
+    solver->direct.residual = 0.0;
     hapi_packs_store(packs, solver->rows);
     spent = rows_run(solver, &is, budget);
     hapi_packs_load(packs, solver->rows);

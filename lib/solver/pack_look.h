@@ -8,10 +8,7 @@
 
 #include "solver/pack_lanes.h"
 
-/* hapi_pack_newton.state */
-#define LANES_FIXED 0.0
-#define LANES_FREE 1.0
-#define LANES_TIED 2.0
+#define LANES_TIED 2.0 /* of hapi_pack_newton.state */
 
 /* Sums over an inspection. */
 typedef struct lanes_look {
@@ -19,7 +16,6 @@ typedef struct lanes_look {
   hapi_four energy2;
   hapi_four sum;
   hapi_four free;
-  hapi_four used;
   hapi_four changed;
   hapi_four outside;
 } lanes_look;
@@ -59,7 +55,6 @@ static HAPI_FOUR_INLINE void state_set(double at[HAPI_LANES], hapi_four state, l
   const hapi_four one = hapi_four_all(1.0);
   const hapi_four used = hapi_four_min(state, one);
   io->changed = hapi_four_add(io->changed, hapi_four_abs(hapi_four_sub(state, hapi_four_load(at))));
-  io->used = hapi_four_add(io->used, used);
   io->free = hapi_four_add(io->free, hapi_four_sub(hapi_four_add(used, used), state));
   hapi_four_store(at, state);
 }
@@ -131,7 +126,7 @@ static HAPI_FOUR_INLINE void packs_look(const hapi_packs *packs, const hapi_pack
                                         bool sticking, lanes_look *out)
 {
   const hapi_four zero = hapi_four_all(0.0);
-  lanes_look sums = {zero, zero, zero, zero, zero, zero, zero};
+  lanes_look sums = {zero, zero, zero, zero, zero, zero};
   for (uint32_t i = 0; i < packs->contact_count; ++i) {
     hapi_four error[3];
     lanes_load3((const double(*)[HAPI_LANES])newton->error[i], error);
@@ -155,7 +150,6 @@ static void packs_inspect(const hapi_packs *packs, const hapi_pack_newton *newto
   out->energy2 = hapi_four_sum(sums.energy2);
   out->sum = hapi_four_sum(sums.sum);
   out->free = (uint32_t)hapi_four_sum(sums.free);
-  out->used = (uint32_t)hapi_four_sum(sums.used);
   out->changed = hapi_four_sum(sums.changed) > 0.0;
   out->outside = hapi_four_sum(sums.outside) > 0.0;
 }

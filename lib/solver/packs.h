@@ -127,9 +127,8 @@ typedef struct hapi_pack_newton {
 typedef struct hapi_pack_look {
   double largest;
   double energy2;
-  double sum; /* no number, if one of the rows' was */
-  uint32_t free;
-  uint32_t used;
+  double sum;    /* no number, if one of the rows' was */
+  uint32_t free; /* rows */
   bool changed;
   bool outside;
 } hapi_pack_look;
