@@ -103,8 +103,8 @@ static inline void hapi_four_gather(const double *const rows[4], hapi_four out[6
   out[5] = _mm256_unpackhi_pd(last02, last13);
 }
 
-/* The way back, in the order of the rows. */
-static inline void hapi_four_scatter(const hapi_four in[6], double *const rows[4])
+/* Four vectors of six out of their columns: numbers 0 to 3 of each, and the last two. */
+static inline void hapi_four_rows(const hapi_four in[6], __m256d out[4], __m128d out_last[4])
 {
   __m256d even01 = _mm256_unpacklo_pd(in[0], in[1]);
   __m256d odd01 = _mm256_unpackhi_pd(in[0], in[1]);
@@ -112,30 +112,34 @@ static inline void hapi_four_scatter(const hapi_four in[6], double *const rows[4
   __m256d odd23 = _mm256_unpackhi_pd(in[2], in[3]);
   __m256d even45 = _mm256_unpacklo_pd(in[4], in[5]);
   __m256d odd45 = _mm256_unpackhi_pd(in[4], in[5]);
-  _mm256_storeu_pd(rows[0], _mm256_permute2f128_pd(even01, even23, 0x20));
-  _mm_storeu_pd(rows[0] + 4, _mm256_castpd256_pd128(even45));
-  _mm256_storeu_pd(rows[1], _mm256_permute2f128_pd(odd01, odd23, 0x20));
-  _mm_storeu_pd(rows[1] + 4, _mm256_castpd256_pd128(odd45));
-  _mm256_storeu_pd(rows[2], _mm256_permute2f128_pd(even01, even23, 0x31));
-  _mm_storeu_pd(rows[2] + 4, _mm256_extractf128_pd(even45, 1));
-  _mm256_storeu_pd(rows[3], _mm256_permute2f128_pd(odd01, odd23, 0x31));
-  _mm_storeu_pd(rows[3] + 4, _mm256_extractf128_pd(odd45, 1));
+  out[0] = _mm256_permute2f128_pd(even01, even23, 0x20);
+  out[1] = _mm256_permute2f128_pd(odd01, odd23, 0x20);
+  out[2] = _mm256_permute2f128_pd(even01, even23, 0x31);
+  out[3] = _mm256_permute2f128_pd(odd01, odd23, 0x31);
+  out_last[0] = _mm256_castpd256_pd128(even45);
+  out_last[1] = _mm256_castpd256_pd128(odd45);
+  out_last[2] = _mm256_extractf128_pd(even45, 1);
+  out_last[3] = _mm256_extractf128_pd(odd45, 1);
+}
+
+/* The way back, in the order of the rows. */
+static inline void hapi_four_scatter(const hapi_four in[6], double *const rows[4])
+{
+  __m256d first[4];
+  __m128d last[4];
+  hapi_four_rows(in, first, last);
+  for (int i = 0; i < 4; ++i) {
+    _mm256_storeu_pd(rows[i], first[i]);
+    _mm_storeu_pd(rows[i] + 4, last[i]);
+  }
 }
 
 /* The same, added to what is there. */
 static inline void hapi_four_scatter_add(const hapi_four in[6], double *const rows[4])
 {
-  __m256d even01 = _mm256_unpacklo_pd(in[0], in[1]);
-  __m256d odd01 = _mm256_unpackhi_pd(in[0], in[1]);
-  __m256d even23 = _mm256_unpacklo_pd(in[2], in[3]);
-  __m256d odd23 = _mm256_unpackhi_pd(in[2], in[3]);
-  __m256d even45 = _mm256_unpacklo_pd(in[4], in[5]);
-  __m256d odd45 = _mm256_unpackhi_pd(in[4], in[5]);
-  const __m256d first[4] = {
-      _mm256_permute2f128_pd(even01, even23, 0x20), _mm256_permute2f128_pd(odd01, odd23, 0x20),
-      _mm256_permute2f128_pd(even01, even23, 0x31), _mm256_permute2f128_pd(odd01, odd23, 0x31)};
-  const __m128d last[4] = {_mm256_castpd256_pd128(even45), _mm256_castpd256_pd128(odd45),
-                           _mm256_extractf128_pd(even45, 1), _mm256_extractf128_pd(odd45, 1)};
+  __m256d first[4];
+  __m128d last[4];
+  hapi_four_rows(in, first, last);
   for (int i = 0; i < 4; ++i) {
     _mm256_storeu_pd(rows[i], _mm256_add_pd(_mm256_loadu_pd(rows[i]), first[i]));
     _mm_storeu_pd(rows[i] + 4, _mm_add_pd(_mm_loadu_pd(rows[i] + 4), last[i]));
