@@ -247,6 +247,31 @@ TEST(impulses_are_what_the_rows_ask_for)
   CHECK_SAY(solves >= 8, "%u direct solves", solves);
 }
 
+/* Bodies on the ground that do not know of each other; direct_rows is for each. */
+TEST(what_is_too_much_at_once_is_solved_one_by_one)
+{
+  uint32_t count = 0;
+  problem_make(&one, 5, 0.3, 4);
+  memset(one.rows, 0, sizeof one.rows);
+  for (uint32_t body = 10; body < 30; ++body) {
+    double frame[3][3];
+    random_frame(frame);
+    for (uint32_t i = 0; i < 3; ++i) {
+      contact_fill(&one.rows[count], body, 0, frame, 0.3);
+      one.rows[count + 1].normal = one.rows[count + 2].normal = (int32_t)count;
+      count += 3;
+    }
+  }
+  one.solver.row_count = count;
+  one.solver.direct_rows = 9;
+  problem_link(&one, hapi_pack_work_best());
+  rows_ready(&one, hapi_contact_ready, hapi_row_ready);
+  problem_run(&one);
+  CHECK(one.solver.packs.count > 0);
+  CHECK_SAY(one.solver.direct_solves >= 10, "%u direct solves", one.solver.direct_solves);
+  CHECK_SAY(rows_miss(&one) < 1e-10, "%g", rows_miss(&one));
+}
+
 /* As what was pushed out has it; with packs and without. */
 TEST(frictions_go_by_a_load_of_their_own)
 {
