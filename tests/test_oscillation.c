@@ -448,6 +448,24 @@ TEST(a_hand_about_which_the_force_turns_does_not_run_away)
   }
 }
 
+/* Beyond the first level it goes on as fast, and from 3 N on at 0.35 m/s; or it gains as much bit
+ * by bit. */
+TEST(a_pointer_that_is_moved_with_a_new_speed_does_not_run_away)
+{
+  for (int leaps = 0; leaps < 2; ++leaps) {
+    swing_pointer();
+    double way = 1e-6;
+    double speed = 0.05;
+    for (int i = 0; i < 200 && 1000.0 * way < 6.0; ++i) {
+      bool free = leaps == 0 || 1000.0 * way < 1.6;
+      swing_tick(-1000.0 * way, way, speed);
+      way += speed * T;
+      speed = free ? speed + 4000.0 * way * T : 1000.0 * way < 3.0 ? speed : 0.35;
+    }
+    CHECK(1000.0 * way >= 6.0 && swing_took() == (leaps == 0));
+  }
+}
+
 TEST(a_hand_with_a_device_is_heavier_than_a_kilogram)
 {
   CHECK(runaway_run(&(runaway_law){.beyond = 2.0 / 0.8}).asked_n > 0.0);

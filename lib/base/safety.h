@@ -125,6 +125,7 @@
 #define HAPI_SAFETY_RUNAWAY_BEGIN 0.08   /* 1 */
 #define HAPI_SAFETY_RUNAWAY_FULL 0.24    /* 1 */
 #define HAPI_SAFETY_RUNAWAY_KEPT 0.75    /* 1 */
+#define HAPI_SAFETY_RUNAWAY_LEAP 0.75    /* 1 */
 #define HAPI_SAFETY_RUNAWAY_MASS 1.0     /* kg */
 #define HAPI_SAFETY_RUNAWAY_DOWN_S 0.005 /* s */
 #define HAPI_SAFETY_RUNAWAY_ASK_S 0.006  /* s */

@@ -19,7 +19,8 @@
  * does not follow k x. With x growing as t^n the gain v^2 / W falls as x^(-2/n).
  *
  * The square of its whole speed grows as much. It does not where a hand goes on as fast while the
- * force turns about it: there only the part against the force grows.
+ * force turns about it: there only the part against the force grows. And it grows tick by tick: a
+ * pointer that a program moves has a new speed at once.
  *
  * So the gain is compared from level to level of force. Where it has stayed, the force is taken
  * away in some ms, which asks the device. One of the wrong sign accelerates no more: the fault
@@ -45,14 +46,15 @@ static void runaway_level(hapi_runaway *r, double level, const runaway_tick *now
   r->newtons = now->newtons;
   r->speed = now->against;
   r->square = now->square;
-  r->work = r->way = 0.0;
+  r->work = r->way = r->leap = 0.0;
 }
 
 /* At a level: what was gained against the force since the one before. */
 static void runaway_judge(hapi_runaway *r, const runaway_tick *now, double stiffness, double limit)
 {
   double gained = now->against * now->against - r->speed * r->speed;
-  bool faster = now->square - r->square >= 0.5 * gained;
+  double grown = now->square - r->square;
+  bool faster = grown >= 0.5 * gained && r->leap <= HAPI_SAFETY_RUNAWAY_LEAP * grown;
   double gain = r->work > 0.0 ? gained / r->work : 0.0; /* 1/kg */
   bool stays = r->gain > 0.0 && gain >= HAPI_SAFETY_RUNAWAY_KEPT * r->gain &&
                gain >= 2.0 / HAPI_SAFETY_RUNAWAY_MASS;
@@ -104,6 +106,8 @@ bool hapi_runaway_follow(hapi_runaway *runaway, const hapi_pointer *pointer, con
     r->stage = RUNAWAY_IDLE;
     return false;
   }
+  r->leap = hapi_max(r->leap, now.square - r->before);
+  r->before = now.square;
   r->way += now.against * seconds;
   r->work += now.newtons * now.against * seconds;
   double begin = HAPI_SAFETY_RUNAWAY_BEGIN * limit;
