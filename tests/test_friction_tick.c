@@ -6,6 +6,7 @@
 
 #include "tests/tap.h"
 
+#include "local/pointer_friction.h"
 #include "solver/contact_solver.h"
 #include "tests/tick_world.h"
 
@@ -150,6 +151,28 @@ TEST(what_rolls_does_not_slide)
     hapi_v3_madd(p->wrench.force, -along, normal, normal);
     CHECK_NEAR(along, 2.0, 1e-2);
     CHECK(hapi_v3_norm(normal) < 2e-3); /* N; of 1.6 that hold */
+  }
+}
+
+/* Of a stretch that is rounding alone, and may be along the normal, too. */
+TEST(axes_of_friction_have_length_one)
+{
+  static const double stretches[][4] = {{0.0, 0.0, 0.0, 0.0},     {3e-19, -2e-18, 1e-19, 0.0},
+                                        {0.0, 0.0, 2e-18, 0.0},   {1e-200, 0.0, 0.0, 0.0},
+                                        {1e-18, 0.0, 0.0, 1e-18}, {1e-4, 0.0, 0.0, 1e-4}};
+  for (size_t i = 0; i < sizeof stretches / sizeof stretches[0]; ++i) {
+    hapi_friction friction = {.stiffness = K, .normal = {0.0, 0.0, 1.0}};
+    memcpy(friction.stretch, stretches[i], sizeof friction.stretch);
+    hapi_friction_aim(&friction, 0.0, NULL);
+    for (int k = 0; k < 3; ++k) {
+      for (int other = 0; other < 3; ++other) {
+        double sum = 0.0;
+        for (int j = 0; j < 4; ++j) {
+          sum += friction.axes[k][j] * friction.axes[other][j];
+        }
+        CHECK_NEAR(sum, k == other ? 1.0 : 0.0, 1e-12);
+      }
+    }
   }
 }
 

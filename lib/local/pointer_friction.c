@@ -289,8 +289,9 @@ void hapi_friction_aim(hapi_friction *f, double lead, const double gain[3])
   }
   double along[3];
   set_tangent(f->normal, pull, along);
-  f->pull = stretch_norm(pull);
-  double sliding = f->pull > 0.0 ? hapi_v3_dot(pull, along) / f->pull : 1.0;
+  double slides = hapi_v3_dot(pull, along); /* of rounding alone, it may be across any tangent */
+  f->pull = sqrt(slides * slides + pull[3] * pull[3]);
+  double sliding = f->pull > 0.0 ? slides / f->pull : 1.0;
   double turning = f->pull > 0.0 ? pull[3] / f->pull : 0.0;
   hapi_v3_scale(sliding, along, f->axes[0]);
   f->axes[0][3] = turning;

@@ -35,20 +35,46 @@ typedef struct lists {
 
 /* ---- islands ---- */
 
+/* The rows of a contact, from its normal on: they know of each other, and are in one list even
+ * where a body on rails answers to some of them only. */
+typedef struct contact_rows {
+  uint32_t end;
+  uint8_t moves; /* any of them, HAPI_MOVES_ */
+} contact_rows;
+
+static contact_rows contact_at(const hapi_solver *solver, uint32_t first)
+{
+  const hapi_row *rows = solver->rows;
+  contact_rows out = {.end = first};
+  do {
+    out.moves |= rows[out.end].inverse != 0.0 ? rows[out.end].moves : 0u;
+    ++out.end;
+  } while (out.end < solver->row_count && rows[out.end].normal == (int32_t)first);
+  return out;
+}
+
+static void chain_row(hapi_row *rows, uint16_t leaf, uint32_t index, lists *out)
+{
+  if (out->leaf_head[leaf] == HAPI_NO_SOLVER_ROW) {
+    out->leaf_head[leaf] = index;
+  } else {
+    rows[out->leaf_tail[leaf]].next = index;
+  }
+  rows[index].next = HAPI_NO_SOLVER_ROW;
+  out->leaf_tail[leaf] = index;
+}
+
 static void chain_rows(hapi_solver *solver, uint16_t *leaf, lists *out)
 {
-  const hapi_row *last = NULL;
-  uint16_t r = 0;
-  for (uint32_t i = solver->row_count; i-- > 0;) {
-    hapi_row *row = &solver->rows[i];
-    if (row->inverse != 0.0) {
-      if (!hapi_row_ties_same(row, last)) {
-        r = hapi_root(leaf, (uint16_t)(hapi_row_moves_a(row) ? row->a : row->b));
+  hapi_row *rows = solver->rows;
+  for (uint32_t i = 0; i < solver->row_count;) {
+    const contact_rows contact = contact_at(solver, i);
+    const uint32_t body = (contact.moves & HAPI_MOVES_A) != 0 ? rows[i].a : rows[i].b;
+    const uint16_t r = hapi_root(leaf, (uint16_t)body);
+    for (; i < contact.end; ++i) {
+      if (rows[i].inverse != 0.0) {
+        chain_row(rows, r, i, out);
       }
-      last = row;
-      row->next = out->leaf_head[r];
-      out->leaf_tail[r] = out->leaf_head[r] == HAPI_NO_SOLVER_ROW ? i : out->leaf_tail[r];
-      out->leaf_head[r] = i;
     }
   }
 }
@@ -77,18 +103,15 @@ static void islands_split(hapi_solver *solver, lists *out)
 {
   uint16_t leaf[HAPI_SOLVER_BODIES];
   uint16_t whole[HAPI_SOLVER_BODIES];
-  const hapi_row *last = NULL;
   for (uint32_t i = 0; i < solver->body_count; ++i) {
     leaf[i] = whole[i] = (uint16_t)i;
     out->head[i] = out->leaf_head[i] = HAPI_NO_SOLVER_ROW;
   }
-  for (uint32_t i = 0; i < solver->row_count; ++i) {
+  for (uint32_t i = 0; i < solver->row_count;) {
     const hapi_row *row = &solver->rows[i];
-    if (row->inverse == 0.0 || hapi_row_ties_same(row, last)) {
-      continue;
-    }
-    last = row;
-    if (hapi_row_moves_b(row) && hapi_row_moves_a(row)) {
+    const contact_rows contact = contact_at(solver, i);
+    i = contact.end;
+    if (contact.moves == (HAPI_MOVES_A | HAPI_MOVES_B)) {
       hapi_unite(whole, row->a, row->b);
       if (!hapi_is_hub(solver, row->b)) {
         hapi_unite(leaf, row->a, row->b);
