@@ -74,7 +74,7 @@ static inline void wired_put(wired_messages *w, wired_way *way, uint32_t channel
 {
   int64_t due = w->now_ns + 1 + (int64_t)(1e9 * (w->delay_s + w->jitter_s * wired_random(w)));
   if (reliable) {
-    due = due > way->reliable_ns ? due : way->reliable_ns;
+    due = due > way->reliable_ns ? due : way->reliable_ns + 1; /* in their order */
     way->reliable_ns = due;
   }
   for (uint32_t i = 0; i < WIRED_DATAGRAMS; ++i) {
