@@ -6,32 +6,78 @@
 
 #include "solver/island_matrix.h"
 
-#include <string.h>
-
 #include "base/six.h"
 
-/* m = m^-1, by steps of Gauss and Jordan: row k by the pivot, the others freed of column k, in
- * which the inverse grows. No pivoting: such a block is 1 plus a product of positive definite
- * matrices as long as nothing slides, and what sliding spoils is not accepted. */
-static void block_invert(double m[36])
+/* m = L U, L with ones on its diagonal, where the inverses of U's stand. No pivoting: such a block
+ * is 1 plus a product of positive definite matrices as long as nothing slides, and what sliding
+ * spoils is not accepted. */
+static inline void split_step(double m[36], const int k)
 {
-  for (int k = 0; k < 6; ++k) {
-    double pivot = 1.0 / m[7 * k];
-    m[7 * k] = 1.0;
-    for (int c = 0; c < 6; ++c) {
-      m[6 * k + c] *= pivot;
+  const int odd = (k + 1) % 2; /* the column k + 1 is the second one of a pair */
+  const double pivot = 1.0 / m[7 * k];
+  m[7 * k] = pivot;
+  for (int i = k + 1; i < 6; ++i) {
+    const double share = m[6 * i + k] * pivot;
+    const hapi_two by = hapi_two_all(-share);
+    m[6 * i + k] = share;
+    if (odd) {
+      m[6 * i + k + 1] -= share * m[6 * k + k + 1];
     }
-    for (int i = 0; i < 6; ++i) {
-      if (i != k) {
-        double f = m[6 * i + k];
-        m[6 * i + k] = 0.0;
-        hapi_madd6(m + 6 * i, -f, m + 6 * k);
-      }
+    for (int c = k + 1 + odd; c < 6; c += 2) {
+      double *at = m + 6 * i + c;
+      hapi_two_store(at, hapi_two_madd(hapi_two_load(at), by, hapi_two_load(m + 6 * k + c)));
     }
   }
 }
 
-/* out = out - a b */
+static void block_split(double m[36])
+{
+  split_step(m, 0);
+  split_step(m, 1);
+  split_step(m, 2);
+  split_step(m, 3);
+  split_step(m, 4);
+  split_step(m, 5);
+}
+
+/* x = (L U)^-1 x */
+static void split_solve(const double m[36], double x[6])
+{
+  for (int i = 1; i < 6; ++i) {
+    for (int k = 0; k < i; ++k) {
+      x[i] -= m[6 * i + k] * x[k];
+    }
+  }
+  for (int i = 5; i >= 0; --i) {
+    for (int k = 5; k > i; --k) {
+      x[i] -= m[6 * i + k] * x[k];
+    }
+    x[i] *= m[7 * i];
+  }
+}
+
+/* The same of the six columns of a block. */
+static void split_solve_block(const double m[36], double block[36])
+{
+  for (int c = 0; c < 6; c += 2) {
+    hapi_two x[6];
+    for (int i = 0; i < 6; ++i) {
+      x[i] = hapi_two_load(block + 6 * i + c);
+      for (int k = 0; k < i; ++k) {
+        x[i] = hapi_two_sub(x[i], hapi_two_mul(hapi_two_all(m[6 * i + k]), x[k]));
+      }
+    }
+    for (int i = 5; i >= 0; --i) {
+      for (int k = 5; k > i; --k) {
+        x[i] = hapi_two_sub(x[i], hapi_two_mul(hapi_two_all(m[6 * i + k]), x[k]));
+      }
+      x[i] = hapi_two_mul(x[i], hapi_two_all(m[7 * i]));
+      hapi_two_store(block + 6 * i + c, x[i]);
+    }
+  }
+}
+
+/* out -= a b */
 static void multiply_sub(const double a[36], const double b[36], double out[36])
 {
   for (int i = 0; i < 6; ++i) {
@@ -57,53 +103,48 @@ static void apply_sub(const double m[36], const double x[6], double y[6])
   }
 }
 
-/* Block LU: diagonal blocks become their inverses, blocks below factors. */
+/* Diagonal blocks D become L and U, those right of them D^-1 of what they were. */
 void hapi_island_decompose(hapi_island *is)
 {
   for (uint32_t k = 0; k < is->count; ++k) {
-    uint16_t p = is->pivot[k];
+    const uint16_t p = is->pivot[k];
     const hapi_body_set *rest = &is->rest[p];
-    double *diagonal = is->blocks[is->block[p][p]];
-    block_invert(diagonal);
+    const double *diagonal = is->blocks[is->block[p][p]];
+    block_split(is->blocks[is->block[p][p]]);
+    for (uint32_t j = hapi_set_next(rest, 0); j < HAPI_ISLAND_BODIES;
+         j = hapi_set_next(rest, j + 1)) {
+      split_solve_block(diagonal, is->blocks[is->block[p][j]]);
+    }
     for (uint32_t i = hapi_set_next(rest, 0); i < HAPI_ISLAND_BODIES;
          i = hapi_set_next(rest, i + 1)) {
-      double *below = is->blocks[is->block[i][p]];
-      double l[36] = {0.0};
-      multiply_sub(below, diagonal, l);
-      for (int c = 0; c < 36; ++c) {
-        below[c] = l[c] = -l[c];
-      }
+      const double *below = is->blocks[is->block[i][p]];
       for (uint32_t j = hapi_set_next(rest, 0); j < HAPI_ISLAND_BODIES;
            j = hapi_set_next(rest, j + 1)) {
-        multiply_sub(l, is->blocks[is->block[p][j]], is->blocks[is->block[i][j]]);
+        multiply_sub(below, is->blocks[is->block[p][j]], is->blocks[is->block[i][j]]);
       }
     }
   }
 }
 
-/* dv: in right side, out solution */
 void hapi_island_substitute(hapi_island *is)
 {
   for (uint32_t k = 0; k < is->count; ++k) {
-    uint16_t p = is->pivot[k];
+    const uint16_t p = is->pivot[k];
     const hapi_body_set *rest = &is->rest[p];
+    double *at = is->dv[is->body[p]];
+    split_solve(is->blocks[is->block[p][p]], at);
     for (uint32_t i = hapi_set_next(rest, 0); i < HAPI_ISLAND_BODIES;
          i = hapi_set_next(rest, i + 1)) {
-      apply_sub(is->blocks[is->block[i][p]], is->dv[is->body[p]], is->dv[is->body[i]]);
+      apply_sub(is->blocks[is->block[i][p]], at, is->dv[is->body[i]]);
     }
   }
   for (uint32_t k = is->count; k-- > 0;) {
-    uint16_t p = is->pivot[k];
+    const uint16_t p = is->pivot[k];
     const hapi_body_set *rest = &is->rest[p];
-    double y[6];
-    memcpy(y, is->dv[is->body[p]], sizeof y);
+    double *at = is->dv[is->body[p]];
     for (uint32_t j = hapi_set_next(rest, 0); j < HAPI_ISLAND_BODIES;
          j = hapi_set_next(rest, j + 1)) {
-      apply_sub(is->blocks[is->block[p][j]], is->dv[is->body[j]], y);
-    }
-    const double *inverse = is->blocks[is->block[p][p]];
-    for (int i = 0; i < 6; ++i) {
-      is->dv[is->body[p]][i] = hapi_dot6(inverse + 6 * i, y);
+      apply_sub(is->blocks[is->block[p][j]], is->dv[is->body[j]], at);
     }
   }
 }
