@@ -32,8 +32,8 @@ typedef struct tick_row {
 static const tick_row tick_rows[] = {
     {0, 50.0, 600, 0, 0.1, 1, false},
     {10, 50.0, 600, 0, 0.1, 4, true},
-    {20, 100.0, 1250, 0, 0.1, HAP_RANGE_ALL, true},
-    {30, 100.0, 2500, 0, 0.1, HAP_RANGE_ALL, true},
+    {20, 100.0, 2500, 0, 0.1, HAP_RANGE_ALL, true},
+    {30, 100.0, 4000, 0, 0.1, HAP_RANGE_ALL, true},
     {40, 200.0, 8000, 0, 0.05, HAP_RANGE_ALL, true},
     {50, 200.0, 20000, 6, 0.03, HAP_RANGE_ALL, true},
     {70, 333.0, 20000, 8, 0.01, HAP_RANGE_ALL, true},

@@ -831,7 +831,6 @@ void hapi_solver_run(hapi_solver *solver)
       at_pairs = before[0];
       updates_spend(solver, &left, of_pairs);
       way.begun = false;
-      before[0] = before[1] = 0.0;
       hapi_trend_begin(&trend);
     }
     /* Direct solves may have one half of the budget: where they lead in circles between two sets of

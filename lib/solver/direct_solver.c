@@ -17,7 +17,9 @@
 #define SOFTER 10.0    /* times R, after a round that made things worse */
 #define FIRMER 0.01    /* times that, where R leaves too much of the errors */
 #define AGAIN 3        /* times the same matrix, at most, */
-#define ENOUGH 1e-6    /* until so much of the tolerance is due */
+#define ENOUGH 1e-6    /* until so much of the tolerance is due, */
+#define PAYS 0.5       /* while each leaves no more than this of what was due */
+#define LITTLE 2e-6    /* m/s, that are enough where bodies move, whatever set they come from */
 #define HUBS_MAX 16    /* with more, islands about hubs are solved as others */
 #define HUB_ROUNDS 6   /* steps of the hubs */
 
@@ -147,7 +149,7 @@ static void state_take(newton *n, bool stays)
     hapi_island_cut(is);
     n->due = hapi_island_inspect(is, false);
   }
-  bool solved = n->due < tolerance || (stays && is->look.settled);
+  bool solved = n->due < tolerance || (is->look.settled && (stays || n->due < LITTLE));
   if (solved || (n->due < n->least && !n->solved)) {
     n->solved = solved;
     n->better = true;
@@ -170,12 +172,16 @@ static void round_make(newton *n)
   n->left -= n->step;
   const bool stays = !is->look.changed;
   for (int i = 0; i < AGAIN && n->left >= n->step && !is->look.changed; ++i) {
-    if (n->due < ENOUGH * is->solver->tolerance) {
+    const double before = n->due;
+    if (before < ENOUGH * is->solver->tolerance) {
       break;
     }
     hapi_island_solve_again(is);
     n->left -= n->step / 2;
     n->due = hapi_island_inspect(is, false);
+    if (n->due > PAYS * before) {
+      break;
+    }
   }
   state_take(n, stays);
 }
@@ -200,7 +206,7 @@ static bool island_improve(hapi_island *is, uint32_t step, uint32_t *io_left, do
     is->softening = hapi_max(is->softening, HAPI_FIRM);
   }
   /* R slows what answers far less than its rows say, and has a say in where redundant ones push. */
-  const bool slow = n.least >= is->solver->tolerance;
+  const bool slow = n.least >= (exact ? is->solver->tolerance : LITTLE);
   if (n.solved && (slow || exact) && has_time(&n)) {
     hapi_island_restore(is);
     is->softening = HAPI_FIRM;
