@@ -43,14 +43,27 @@ static inline void hapi_set_add_all(hapi_body_set *set, const hapi_body_set *mor
   set->bits[1] |= more->bits[1];
 }
 
+/* Of bits that are not 0. */
+static inline uint32_t hapi_set_lowest(uint64_t bits)
+{
+#if defined(__GNUC__)
+  return (uint32_t)__builtin_ctzll(bits);
+#else
+  uint32_t at = 0;
+  for (; (bits & 1) == 0; bits >>= 1) {
+    ++at;
+  }
+  return at;
+#endif
+}
+
 /* The first that is at `from` or after it; HAPI_ISLAND_BODIES: none. */
 static inline uint32_t hapi_set_next(const hapi_body_set *set, uint32_t from)
 {
   for (uint32_t word = from / 64; word < 2; from = 64 * ++word) {
-    for (uint64_t bits = set->bits[word] >> from % 64; bits != 0; bits >>= 1, ++from) {
-      if ((bits & 1) != 0) {
-        return from;
-      }
+    const uint64_t bits = set->bits[word] >> from % 64;
+    if (bits != 0) {
+      return from + hapi_set_lowest(bits);
     }
   }
   return HAPI_ISLAND_BODIES;

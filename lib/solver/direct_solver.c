@@ -16,10 +16,13 @@
 #define ROUNDS_VAIN 4u /* the same, where none has made things better */
 #define SOFTER 10.0    /* times R, after a round that made things worse */
 #define FIRMER 0.01    /* times that, where R leaves too much of the errors */
+#define SOFT 1e-5      /* R at least while the set changes: with less it goes astray */
 #define AGAIN 3        /* times the same matrix, at most, */
 #define ENOUGH 1e-6    /* until so much of the tolerance is due, */
 #define PAYS 0.5       /* while each leaves no more than this of what was due */
-#define LITTLE 2e-6    /* m/s, that are enough where bodies move, whatever set they come from */
+#define LITTLE 2e-6    /* m/s, that are enough where bodies move, whatever set they come from; */
+#define MOVES 1e-3     /* m/s, that is: slower ones would creep by what is left */
+#define TURNS 1e-2     /* rad/s, likewise */
 #define HUBS_MAX 16    /* with more, islands about hubs are solved as others */
 #define HUB_ROUNDS 6   /* steps of the hubs */
 
@@ -129,8 +132,9 @@ static void islands_split(hapi_solver *solver, lists *out)
 /* Newton's method. */
 typedef struct newton {
   hapi_island *is;
-  double least; /* due in the best state, which is saved, m/s */
-  double due;   /* in the one at hand */
+  double least;  /* due in the best state, which is saved, m/s */
+  double due;    /* in the one at hand */
+  double little; /* m/s, that are enough whatever the set */
   uint32_t rounds;
   uint32_t step; /* row updates, of a round; */
   uint32_t left; /* these */
@@ -149,7 +153,7 @@ static void state_take(newton *n, bool stays)
     hapi_island_cut(is);
     n->due = hapi_island_inspect(is, false);
   }
-  bool solved = n->due < tolerance || (is->look.settled && (stays || n->due < LITTLE));
+  bool solved = n->due < tolerance || (is->look.settled && (stays || n->due < n->little));
   if (solved || (n->due < n->least && !n->solved)) {
     n->solved = solved;
     n->better = true;
@@ -186,6 +190,21 @@ static void round_make(newton *n)
   state_take(n, stays);
 }
 
+/* Whether any body does. */
+static bool island_moves(const hapi_island *is)
+{
+  double linear = 0.0;
+  double angular = 0.0;
+  for (uint32_t i = 0; i < is->count; ++i) {
+    const double *v = is->solver->v[is->body[i]];
+    for (int k = 0; k < 3; ++k) {
+      linear = hapi_max(fabs(v[k]), linear);
+      angular = hapi_max(fabs(v[3 + k]), angular);
+    }
+  }
+  return linear > MOVES || angular > TURNS;
+}
+
 static bool has_time(const newton *n)
 {
   return n->rounds < (n->better ? ROUNDS : ROUNDS_VAIN) && n->left >= n->step;
@@ -197,16 +216,22 @@ static bool has_time(const newton *n)
 static bool island_improve(hapi_island *is, uint32_t step, uint32_t *io_left, double *io_due)
 {
   const bool exact = !(is->solver->coarse.energy2 > 0.0);
-  newton n = {.is = is, .least = *io_due, .due = *io_due, .step = step, .left = *io_left};
+  const bool moves = !exact && island_moves(is);
+  newton n = {.is = is,
+              .least = *io_due,
+              .due = *io_due,
+              .little = moves ? LITTLE : is->solver->tolerance,
+              .step = step,
+              .left = *io_left};
   hapi_island_save(is);
   while (!n.solved && has_time(&n)) {
     double last = n.due;
     round_make(&n);
     is->softening *= !is->look.changed ? FIRMER : n.due > last ? SOFTER : 1.0 / SOFTER;
-    is->softening = hapi_max(is->softening, HAPI_FIRM);
+    is->softening = hapi_max(is->softening, is->look.changed && !exact ? SOFT : HAPI_FIRM);
   }
   /* R slows what answers far less than its rows say, and has a say in where redundant ones push. */
-  const bool slow = n.least >= (exact ? is->solver->tolerance : LITTLE);
+  const bool slow = n.least >= n.little;
   if (n.solved && (slow || exact) && has_time(&n)) {
     hapi_island_restore(is);
     is->softening = HAPI_FIRM;

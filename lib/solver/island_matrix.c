@@ -6,6 +6,8 @@
 
 #include "solver/island_matrix.h"
 
+#include <string.h>
+
 #include "base/six.h"
 
 /* m = L U, L with ones on its diagonal, where the inverses of U's stand. No pivoting: such a block
@@ -40,72 +42,53 @@ static void block_split(double m[36])
   split_step(m, 5);
 }
 
+static inline void split_row_begin(const double m[36], const int i, double x[6])
+{
+  for (int k = 0; k < i; ++k) {
+    x[i] -= m[6 * i + k] * x[k];
+  }
+}
+
+static inline void split_row_end(const double m[36], const int i, double x[6])
+{
+  for (int k = 5; k > i; --k) {
+    x[i] -= m[6 * i + k] * x[k];
+  }
+  x[i] *= m[7 * i];
+}
+
 /* x = (L U)^-1 x */
-static void split_solve(const double m[36], double x[6])
+static void split_solve(const double m[36], double io[6])
 {
-  for (int i = 1; i < 6; ++i) {
-    for (int k = 0; k < i; ++k) {
-      x[i] -= m[6 * i + k] * x[k];
-    }
-  }
-  for (int i = 5; i >= 0; --i) {
-    for (int k = 5; k > i; --k) {
-      x[i] -= m[6 * i + k] * x[k];
-    }
-    x[i] *= m[7 * i];
-  }
-}
-
-/* The same of the six columns of a block. */
-static void split_solve_block(const double m[36], double block[36])
-{
-  for (int c = 0; c < 6; c += 2) {
-    hapi_two x[6];
-    for (int i = 0; i < 6; ++i) {
-      x[i] = hapi_two_load(block + 6 * i + c);
-      for (int k = 0; k < i; ++k) {
-        x[i] = hapi_two_sub(x[i], hapi_two_mul(hapi_two_all(m[6 * i + k]), x[k]));
-      }
-    }
-    for (int i = 5; i >= 0; --i) {
-      for (int k = 5; k > i; --k) {
-        x[i] = hapi_two_sub(x[i], hapi_two_mul(hapi_two_all(m[6 * i + k]), x[k]));
-      }
-      x[i] = hapi_two_mul(x[i], hapi_two_all(m[7 * i]));
-      hapi_two_store(block + 6 * i + c, x[i]);
-    }
-  }
-}
-
-/* out -= a b */
-static void multiply_sub(const double a[36], const double b[36], double out[36])
-{
-  for (int i = 0; i < 6; ++i) {
-    double *row = out + 6 * i;
-    hapi_two sums[3] = {hapi_two_load(row), hapi_two_load(row + 2), hapi_two_load(row + 4)};
-    for (int k = 0; k < 6; ++k) {
-      hapi_two share = hapi_two_all(-a[6 * i + k]);
-      for (int c = 0; c < 3; ++c) {
-        sums[c] = hapi_two_madd(sums[c], share, hapi_two_load(b + 6 * k + 2 * c));
-      }
-    }
-    for (int c = 0; c < 3; ++c) {
-      hapi_two_store(row + 2 * c, sums[c]);
-    }
-  }
+  double x[6];
+  memcpy(x, io, sizeof x);
+  split_row_begin(m, 1, x);
+  split_row_begin(m, 2, x);
+  split_row_begin(m, 3, x);
+  split_row_begin(m, 4, x);
+  split_row_begin(m, 5, x);
+  split_row_end(m, 5, x);
+  split_row_end(m, 4, x);
+  split_row_end(m, 3, x);
+  split_row_end(m, 2, x);
+  split_row_end(m, 1, x);
+  split_row_end(m, 0, x);
+  memcpy(io, x, sizeof x);
 }
 
 /* y -= m x */
 static void apply_sub(const double m[36], const double x[6], double y[6])
 {
   for (int i = 0; i < 6; ++i) {
-    y[i] -= hapi_dot6(m + 6 * i, x);
+    y[i] -= hapi_dot6_fresh(m + 6 * i, x);
   }
 }
 
 /* Diagonal blocks D become L and U, those right of them D^-1 of what they were. */
 void hapi_island_decompose(hapi_island *is)
 {
+  const hapi_pack_work *work = is->solver->packs.work;
+  work = work != NULL ? work : &hapi_pack_work_pairs;
   for (uint32_t k = 0; k < is->count; ++k) {
     const uint16_t p = is->pivot[k];
     const hapi_body_set *rest = &is->rest[p];
@@ -113,14 +96,14 @@ void hapi_island_decompose(hapi_island *is)
     block_split(is->blocks[is->block[p][p]]);
     for (uint32_t j = hapi_set_next(rest, 0); j < HAPI_ISLAND_BODIES;
          j = hapi_set_next(rest, j + 1)) {
-      split_solve_block(diagonal, is->blocks[is->block[p][j]]);
+      work->block_solve(diagonal, is->blocks[is->block[p][j]]);
     }
     for (uint32_t i = hapi_set_next(rest, 0); i < HAPI_ISLAND_BODIES;
          i = hapi_set_next(rest, i + 1)) {
       const double *below = is->blocks[is->block[i][p]];
       for (uint32_t j = hapi_set_next(rest, 0); j < HAPI_ISLAND_BODIES;
            j = hapi_set_next(rest, j + 1)) {
-        multiply_sub(below, is->blocks[is->block[p][j]], is->blocks[is->block[i][j]]);
+        work->block_multiply_sub(below, is->blocks[is->block[p][j]], is->blocks[is->block[i][j]]);
       }
     }
   }

@@ -5,6 +5,7 @@
 
 /* The work on packs, for a file that says with which registers (base/four.h). */
 
+#include "solver/block_lanes.h"
 #include "solver/pack_aggregate.h"
 #include "solver/pack_blocks.h"
 #include "solver/pack_lanes.h"

@@ -16,9 +16,10 @@
 #endif
 #include "solver/pack_sweep.h"
 
-static const hapi_pack_work wide = {
-    packs_couple, packs_push,  packs_sweep, way_go_on, packs_aggregate, packs_ray,   packs_inspect,
-    packs_miss,   packs_gains, packs_cut,   packs_ask, packs_assemble,  packs_answer};
+static const hapi_pack_work wide = {packs_couple,    packs_push,  packs_sweep,       way_go_on,
+                                    packs_aggregate, packs_ray,   packs_inspect,     packs_miss,
+                                    packs_gains,     packs_cut,   packs_ask,         packs_assemble,
+                                    packs_answer,    block_solve, block_multiply_sub};
 #ifdef __clang__
 #pragma clang attribute pop
 #else

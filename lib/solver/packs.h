@@ -173,6 +173,10 @@ typedef struct hapi_pack_work {
   /* impulses from the saved ones and from dv by body. v: with the saved ones. */
   void (*answer)(const struct hapi_packs *packs, const hapi_pack_newton *newton, double (*dv)[6],
                  double (*v)[6]);
+  /* Of island_matrix.c, which has them without packs as well: columns = (L U)^-1 columns, */
+  void (*block_solve)(const double split[36], double io[36]);
+  /* and io -= a b. */
+  void (*block_multiply_sub)(const double a[36], const double b[36], double io[36]);
 } hapi_pack_work;
 
 /* What is known of the rows. */
