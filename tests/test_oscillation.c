@@ -466,6 +466,18 @@ TEST(a_pointer_that_is_moved_with_a_new_speed_does_not_run_away)
   }
 }
 
+/* Twice as far in each tick, it is at the second level after two. */
+TEST(a_device_that_runs_away_within_some_ticks_is_asked)
+{
+  swing_pointer();
+  double way = 1e-4;
+  for (int i = 0; i < 8; ++i) {
+    swing_tick(-1000.0 * way, way, 0.7 * way / T);
+    way *= exp(0.7);
+  }
+  CHECK(swing_took());
+}
+
 TEST(a_hand_with_a_device_is_heavier_than_a_kilogram)
 {
   CHECK(runaway_run(&(runaway_law){.beyond = 2.0 / 0.8}).asked_n > 0.0);

@@ -298,8 +298,6 @@ TEST(a_session_that_dies_is_not_felt_by_the_other_one)
   CHECK(rig_state(r->session).joined == 1);
 }
 
-/* Four hands, one of them a cube, go about at random in a pile with a hinge; they come and go, and
- * messages are lost, doubled and late. Nothing flies off, and what hands gave is counted. */
 typedef struct pile_course {
   const char *name;
   unsigned random;
@@ -309,6 +307,8 @@ static const pile_course pile_courses[] = {{"hands_come_and_go_in_a_pile", 12345
                                            {"hands_come_and_go_in_another_pile", 7919000},
                                            {"hands_come_and_go_and_throw_nothing", 205894}};
 
+/* Four hands, one of them a cube, go about at random in a pile with a hinge; they come and go, and
+ * messages are lost, doubled and late. Nothing flies off, and what hands gave is counted. */
 TEST_EACH(pile_courses, const pile_course *row)
 {
   static const double corners[8][3] = {

@@ -19,8 +19,9 @@
  * does not follow k x. With x growing as t^n the gain v^2 / W falls as x^(-2/n).
  *
  * The square of its whole speed grows as much. It does not where a hand goes on as fast while the
- * force turns about it: there only the part against the force grows. And it grows tick by tick: a
- * pointer that a program moves has a new speed at once.
+ * force turns about it: there only the part against the force grows. And it grows in every tick,
+ * where a pointer that a program moves has a new speed at once. A level that is reached within two
+ * ticks says nothing of that.
  *
  * So the gain is compared from level to level of force. Where it has stayed, the force is taken
  * away in some ms, which asks the device. One of the wrong sign accelerates no more: the fault
@@ -47,6 +48,7 @@ static void runaway_level(hapi_runaway *r, double level, const runaway_tick *now
   r->speed = now->against;
   r->square = now->square;
   r->work = r->way = r->leap = 0.0;
+  r->ticks = 0;
 }
 
 /* At a level: what was gained against the force since the one before. */
@@ -54,7 +56,8 @@ static void runaway_judge(hapi_runaway *r, const runaway_tick *now, double stiff
 {
   double gained = now->against * now->against - r->speed * r->speed;
   double grown = now->square - r->square;
-  bool faster = grown >= 0.5 * gained && r->leap <= HAPI_SAFETY_RUNAWAY_LEAP * grown;
+  bool leapt = r->ticks > 2 && r->leap > HAPI_SAFETY_RUNAWAY_LEAP * grown;
+  bool faster = grown >= 0.5 * gained && !leapt;
   double gain = r->work > 0.0 ? gained / r->work : 0.0; /* 1/kg */
   bool stays = r->gain > 0.0 && gain >= HAPI_SAFETY_RUNAWAY_KEPT * r->gain &&
                gain >= 2.0 / HAPI_SAFETY_RUNAWAY_MASS;
@@ -108,6 +111,7 @@ bool hapi_runaway_follow(hapi_runaway *runaway, const hapi_pointer *pointer, con
   }
   r->leap = hapi_max(r->leap, now.square - r->before);
   r->before = now.square;
+  ++r->ticks;
   r->way += now.against * seconds;
   r->work += now.newtons * now.against * seconds;
   double begin = HAPI_SAFETY_RUNAWAY_BEGIN * limit;

@@ -69,8 +69,9 @@ typedef struct hapi_runaway {
   double newtons;    /* at the last level */
   double speed;      /* m/s against the force, at the last level; when the force was gone */
   double square;     /* m2/s2, of the whole speed, at the last level */
-  double leap;       /* m2/s2, what that has grown by since then in one tick, the most */
-  double before;     /* m2/s2, at the last tick */
+  double leap;       /* m2/s2, its largest growth in one tick since then */
+  double before;     /* m2/s2, the same at the last tick */
+  uint32_t ticks;    /* since the last level */
   double work;       /* J, against the force since then */
   double way;        /* m, likewise */
   double gain;       /* 1/kg, up to the last level */

@@ -20,8 +20,8 @@
 #define AGAIN 3        /* times the same matrix, at most, */
 #define ENOUGH 1e-6    /* until so much of the tolerance is due, */
 #define PAYS 0.5       /* while each leaves no more than this of what was due */
-#define LITTLE 2e-6    /* m/s, that are enough where bodies move, whatever set they come from; */
-#define MOVES 1e-3     /* m/s, that is: slower ones would creep by what is left */
+#define LITTLE 2e-6    /* m/s, may stay due where bodies move, even if the set still changes */
+#define MOVES 1e-3     /* m/s; slower bodies would creep by what is left */
 #define TURNS 1e-2     /* rad/s, likewise */
 #define HUBS_MAX 16    /* with more, islands about hubs are solved as others */
 #define HUB_ROUNDS 6   /* steps of the hubs */
@@ -134,7 +134,7 @@ typedef struct newton {
   hapi_island *is;
   double least;  /* due in the best state, which is saved, m/s */
   double due;    /* in the one at hand */
-  double little; /* m/s, that are enough whatever the set */
+  double little; /* m/s, may stay due even if the set still changes */
   uint32_t rounds;
   uint32_t step; /* row updates, of a round; */
   uint32_t left; /* these */
@@ -190,7 +190,7 @@ static void round_make(newton *n)
   state_take(n, stays);
 }
 
-/* Whether any body does. */
+/* Whether any body of it is faster than that. */
 static bool island_moves(const hapi_island *is)
 {
   double linear = 0.0;
