@@ -126,10 +126,18 @@ static void place_surfaces(const touch *c)
   c->out->follows &= !(in->rim_a > 0.0) && !(in->rim_b > 0.0) &&
                      (in->touch != HAPI_TOUCH_EDGES || aside2 <= FOLLOW_ASIDE * FOLLOW_ASIDE);
   hapi_v3_madd(a, -0.5 * c->out->gap, c->out->normal, c->out->of_a);
-  if (in->touch == HAPI_TOUCH_FACE_A) { /* of a face, any point stands for its plane */
-    hapi_v3_madd(b, 0.5 * c->out->gap, c->out->normal, c->out->point);
-  } else {
-    hapi_v3_copy(c->out->of_a, c->out->point);
+  switch (in->touch) {
+    case HAPI_TOUCH_FACE_A:
+      hapi_v3_copy(b, c->out->point);
+      break;
+    case HAPI_TOUCH_FACE_B:
+      hapi_v3_copy(a, c->out->point);
+      break;
+    case HAPI_TOUCH_EDGES:
+    case HAPI_TOUCH_BALL_A:
+    case HAPI_TOUCH_BALL_B:
+      hapi_v3_copy(c->out->of_a, c->out->point);
+      break;
   }
 }
 

@@ -18,8 +18,9 @@ typedef struct hapi_touch_frame {
 
 typedef struct hapi_touch_spot {
   double normal[3]; /* world, unit, from b to a */
-  double point[3];  /* world, between the surfaces */
-  double of_a[3];   /* the same, but on a face of a it stays with a while b slides there */
+  double point[3];  /* world: the corner that a face pushes, as ODE's collision of boxes and planes
+                       has it; else between the surfaces */
+  double of_a[3];   /* between the surfaces; on a face of a it stays with a while b slides there */
   double gap;       /* m */
   double slope[3];  /* of the gap: it grows as a goes from b along the normal and this, which is
                        across: where the spot slides along what is tilted; not of a ball */
