@@ -9,6 +9,7 @@
 
 #include "base/vec.h"
 #include "local/contact_memory.h"
+#include "local/contact_run.h"
 #include "sync/exchange.h"
 
 #define CONTACTS 8u
@@ -19,6 +20,8 @@ typedef struct things {
   hapi_exchange *messages[2]; /* in turn: the loop looks at the newest one */
   int turn;
   hapi_contact_memory memory[2][CONTACTS];
+  hapi_contact_run runs[CONTACTS];
+  uint8_t run_lengths[CONTACTS];
   uint32_t buckets[BUCKETS];
   hapi_row_source sources[ROWS * CONTACTS];
   hapi_body_contacts contacts;
@@ -43,6 +46,8 @@ static things *things_new(void)
   }
   t->contacts = (hapi_body_contacts){.memory = t->memory[0],
                                      .old_memory = t->memory[1],
+                                     .runs = t->runs,
+                                     .run_lengths = t->run_lengths,
                                      .buckets = t->buckets,
                                      .bucket_count = BUCKETS};
   t->rows.sources = t->sources;
@@ -174,4 +179,50 @@ TEST(rows_that_are_not_there_do_not_go_on)
     CHECK(t->contacts.memory[i].impulse[0] == (i > 0 ? 11.0 + i : 0.0));
   }
   things_free(t);
+}
+
+static bool runs_are(const things *t, uint8_t first, uint8_t second)
+{
+  const uint8_t *lengths = t->contacts.run_lengths;
+  return lengths[0] == first && lengths[1] == second && lengths[2] == 0 && lengths[3] == 0 &&
+         lengths[4] == 0;
+}
+
+/* One with the first contact, another with the three of a pair. */
+static void runs_leave(things *t)
+{
+  memset(t->run_lengths, 0, sizeof t->run_lengths);
+  t->run_lengths[0] = 1;
+  t->run_lengths[1] = 3;
+}
+
+TEST(a_run_ends_where_one_of_its_contacts_comes_goes_or_changes)
+{
+  static const told_contact all[] = {
+      {1, 11, 0.0}, {2, 12, 0.0}, {2, 13, 0.1}, {2, 14, 0.2}, {3, 15, 0.0}};
+  static const told_contact middle[] = {
+      {1, 11, 0.0}, {2, 12, 0.0}, {2, 21, 0.1}, {2, 14, 0.2}, {3, 15, 0.0}};
+  static const told_contact last[] = {{1, 11, 0.0}, {2, 12, 0.0}, {2, 13, 0.1}};
+  static const told_contact more[] = {
+      {1, 11, 0.0}, {2, 12, 0.0}, {2, 13, 0.1}, {2, 14, 0.2}, {2, 16, 0.3}};
+  static const told_contact other[] = {
+      {4, 31, 0.0}, {2, 12, 0.0}, {2, 13, 0.1}, {2, 14, 0.2}, {3, 15, 0.0}};
+  static const struct {
+    const told_contact *told;
+    uint32_t count;
+    double mu;
+    uint8_t first;
+    uint8_t second;
+  } cases[] = {{all, 5, 0.0, 1, 3},  {middle, 5, 0.0, 1, 0}, {last, 3, 0.0, 1, 0},
+               {more, 5, 0.0, 1, 0}, {other, 5, 0.0, 0, 3},  {all, 5, 1e-3, 0, 0}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    things *t = things_new();
+    message_adopt(t, all, 5, 0.0);
+    rows_leave(t);
+    runs_leave(t);
+    message_adopt(t, cases[i].told, cases[i].count, cases[i].mu);
+    CHECK_SAY(runs_are(t, cases[i].first, cases[i].second), "case %zu: %d %d", i, t->run_lengths[0],
+              t->run_lengths[1]);
+    things_free(t);
+  }
 }

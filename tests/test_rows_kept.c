@@ -646,3 +646,63 @@ TEST(a_box_at_rest_does_not_creep_in_30_s)
   CHECK(hapi_v3_norm(way) < 1e-6);
   CHECK_NEAR(load_on_floor(), 9.81 * MASS, 1e-6);
 }
+
+/* N m: the box rests, rocks from edge to edge, and rests again. */
+static double sway_of(int k)
+{
+  return k % 1000 < 500 ? 0.0 : 0.45 * sin(0.02 * k);
+}
+
+typedef struct sway_tick {
+  hap_pose pose;
+  double impulse[4][3];
+  uint32_t rows;
+  uint32_t kept;
+} sway_tick;
+
+/* looks: all contacts, as no run is left of the tick before. Returns ticks that began with one. */
+static int sway_run(bool looks, sway_tick *out, int ticks)
+{
+  int with_run = 0;
+  box_rest();
+  f.bodies[0].pose.position[2] -= 5e-7; /* as deep as bodies rest in the world */
+  for (int k = 0; k < ticks; ++k) {
+    uint8_t *lengths = f.tick.contacts.run_lengths;
+    f.bodies[0].forced = true;
+    f.bodies[0].given.user_wrench[3] = sway_of(k);
+    with_run += lengths[0] > 1 || lengths[1] > 1 || lengths[2] > 1;
+    if (looks) {
+      memset(lengths, 0, 4);
+    }
+    if (k % 5 == 0) {
+      contacts_adopt(0.5, k % 100 == 0 ? 1 + (uint64_t)k : 1 + (uint64_t)(k - k % 100));
+    }
+    ticks_run(1);
+    memset(&out[k], 0, sizeof out[k]);
+    out[k].pose = f.bodies[0].pose;
+    out[k].rows = f.tick.rows.solver.row_count;
+    out[k].kept = f.tick.rows.kept;
+    for (int i = 0; i < 4; ++i) {
+      memcpy(out[k].impulse[i], f.tick.contacts.memory[i].impulse, sizeof out[k].impulse[i]);
+    }
+  }
+  return with_run;
+}
+
+TEST(contacts_that_are_passed_over_would_have_stayed_to_the_last_bit)
+{
+  enum {
+    TICKS = 8000
+  };
+  static sway_tick passed[2 * TICKS];
+  int with_run = sway_run(false, passed, TICKS);
+  (void)sway_run(true, passed + TICKS, TICKS);
+  CHECK(memcmp(passed, passed + TICKS, TICKS * sizeof *passed) == 0);
+  double most = 0.0;
+  for (int k = 0; k < TICKS; ++k) {
+    most = fmax(most, fabs(passed[k].pose.quat_wxyz[1]));
+  }
+  tap_say("%d ticks of %d with a run, turned by up to %.3g", with_run, (int)TICKS, 2.0 * most);
+  CHECK(with_run > TICKS / 4 && with_run < TICKS - 200);
+  CHECK(most > 1e-3);
+}

@@ -6,6 +6,7 @@
 /* The pure tick with memory of its own, and local models made by hand. */
 
 #include "base/vec.h"
+#include "local/contact_run.h"
 #include "sync/exchange.h"
 #include "tests/tap.h"
 #include "tick/report.h"
@@ -43,6 +44,8 @@ static struct {
   hapi_pointer pointers[POINTERS];
   hapi_model_cross crosses[CROSSES];
   hapi_contact_memory memory[2][CONTACTS];
+  hapi_contact_run runs[CONTACTS];
+  uint8_t run_lengths[CONTACTS];
   uint32_t buckets[BUCKETS];
   hapi_model_joint joints[JOINTS];
   hapi_joint_memory joint_memory[JOINTS];
@@ -95,6 +98,8 @@ static inline void set_up(void)
   f.tick.touches.crosses.of = f.crosses;
   f.tick.contacts.memory = f.memory[0];
   f.tick.contacts.old_memory = f.memory[1];
+  f.tick.contacts.runs = f.runs;
+  f.tick.contacts.run_lengths = f.run_lengths;
   f.tick.contacts.buckets = f.buckets;
   f.tick.contacts.bucket_count = BUCKETS;
   f.tick.joints.of = f.joints;

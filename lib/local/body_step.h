@@ -70,10 +70,12 @@ static inline bool hapi_body_sound(const hap_twist *twist, const double position
   return sum <= 9.0 * HAPI_SAFETY_STATE_LIMIT; /* false for NaN */
 }
 
-/* A state that is not finite stays here: the body stops where it last was and the guard latches. */
+/* A state that is not finite stays here: the body stops where it last was and the guard latches.
+ * Its contacts are made anew, without the impulses that did it. */
 static inline void hapi_body_stop(hapi_bodies *bodies, hapi_local_body *body)
 {
   memset(&body->twist, 0, sizeof body->twist);
+  hapi_stay_end(body);
   bodies->unsound = true;
 }
 

@@ -58,21 +58,32 @@ static uint32_t first_of(const hapi_body_contacts *contacts, uint64_t key, uint3
   return count;
 }
 
+/* That contact is in no run any more. */
+static void run_end(const hapi_body_contacts *contacts, uint32_t index)
+{
+  for (uint32_t back = 0; back < HAPI_RUN_MOST && back <= index; ++back) {
+    uint8_t *length = &contacts->run_lengths[index - back];
+    *length = *length > back ? 0 : *length;
+  }
+}
+
 static bool is_same_contact(const hapi_contact_memory *memory, const hapi_patch_contact *in)
 {
   return memory->number == in->number && in->number != 0;
 }
 
 /* Of a contact that goes on: it keeps its rows as well, if its surface is the same. */
-static void memory_go_on(hapi_contact_memory *memory, const hapi_patch_contact *in,
-                         uint64_t surface, bool *io_changed)
+static void memory_go_on(const hapi_body_contacts *contacts, uint32_t index,
+                         const hapi_patch_contact *in, uint64_t surface, bool *io_changed)
 {
+  hapi_contact_memory *memory = &contacts->memory[index];
   if (memory->kept.surface != in->surface) {
     memory->kept.surface = in->surface;
   }
   if (memory->surface != surface) {
     memory->surface = surface;
     memory->kept.what = HAPI_KEPT_NOTHING;
+    run_end(contacts, index);
     *io_changed = true;
   }
 }
@@ -92,6 +103,7 @@ static void memory_put_aside(hapi_body_contacts *contacts, uint32_t index, const
   hapi_contact_memory *aside = &contacts->old_memory[(*io_count)++];
   *aside = contacts->memory[index];
   contacts->memory[index].number = 0;
+  run_end(contacts, index);
   if (aside->kept.what == HAPI_KEPT_ROWS && !rows_are_of(rows, &aside->kept, index)) {
     aside->kept.what = HAPI_KEPT_NOTHING;
   }
@@ -180,6 +192,7 @@ static void pair_begin(const hapi_body_contacts *contacts, const hapi_patch_cont
   }
   for (uint32_t i = begin; i < count && in[i].key == in[index].key; ++i) {
     contacts->memory[i].kept.what = HAPI_KEPT_NOTHING;
+    run_end(contacts, i);
   }
 }
 
@@ -198,7 +211,7 @@ static void memories_fill(hapi_body_contacts *contacts, hapi_patches *patches, u
       surface = hapi_surface_hash(&surfaces[in[i].surface]);
     }
     if (contacts->memory[i].number == 0 && memory_come_back(contacts, i, &in[i], rows, aside)) {
-      memory_go_on(&contacts->memory[i], &in[i], surface, &ignored);
+      memory_go_on(contacts, i, &in[i], surface, &ignored);
     }
   }
   /* Then the new ones: none is to take the impulses of what has come back. */
@@ -237,7 +250,7 @@ void hapi_body_contacts_adopt(hapi_body_contacts *contacts, hapi_patches *patche
       surface = hapi_surface_hash(&surfaces[in[i].surface]);
     }
     if (i < count && is_same_contact(memory, &in[i])) {
-      memory_go_on(memory, &in[i], surface, &changed);
+      memory_go_on(contacts, i, &in[i], surface, &changed);
     } else {
       memory_put_aside(contacts, i, rows, &aside);
       first = i < first ? i : first;

@@ -9,6 +9,7 @@
 #include "local/body_stay.h"
 #include "local/body_step.h"
 #include "local/body_still.h"
+#include "local/contact_run.h"
 #include "local/touch_place.h"
 
 /* Contacts between bodies as rows of the solver. A contact is placed anew from the poses of its
@@ -22,10 +23,6 @@
 #define PUSH_OUT_MAX 0.2    /* m/s */
 #define PUSH_OUT_SLOP 1e-6  /* m, depth that is left alone */
 #define PUSH_OUT_LEAST 2e-4 /* m/s: less may stay in the velocity, it is not worth a second solve */
-#define OPEN_FLOOR \
-  1e-3 /* m: a contact that is more open than this and than what the bodies'
-                               motion closes in a few ticks has no rows */
-#define OPEN_TICKS 3.0
 #define LEAVE_FLOOR \
   2e-3 /* m: one that has rows keeps them so far, or all behind them would change
                                their places with each contact that opens and closes */
@@ -311,7 +308,7 @@ static bool is_near(const placed_contact *c, double floor, double period)
     return true;
   }
   double speed = point_speed(c->a, c->point) + point_speed(c->b, c->point);
-  return c->gap <= floor + OPEN_TICKS * period * speed;
+  return c->gap <= floor + HAPI_OPEN_TICKS * period * speed;
 }
 
 /* m/s along the normal, before the tick; negative: they come nearer. */
@@ -373,8 +370,6 @@ void hapi_contact_wake(const hapi_body_contacts *contacts, const hapi_bodies *bo
  * short. */
 #define SLOPE_LEAST 2e-4
 
-#define SLOW_WAY2 (HAPI_STAY_SLOW_WAY * HAPI_STAY_SLOW_WAY)
-
 /* m, more than the gap of a contact without rows is off by: a touch that slides has a slope of 0.2
  * at most, over the way of both bodies against each other. */
 #define APART_SLACK 2e-4
@@ -403,43 +398,27 @@ static void moment_of(const hapi_local_body *body, const double point[3], double
   }
 }
 
-/* The stays of its bodies, and how far a has gone from b since they began. */
-typedef struct contact_stays {
-  const hapi_body_stay *a;
-  const hapi_body_stay *b;
-  double apart[3]; /* m */
-} contact_stays;
-
-static void stays_find(const hapi_local_body *a, const hapi_local_body *b, contact_stays *out)
-{
-  out->a = hapi_stay_of(a);
-  out->b = hapi_stay_of(b);
-  hapi_v3_sub(out->a->moved, out->b->moved, out->apart);
-}
-
 /* m: how much farther the bodies of a kept contact have gone from each other along the normal since
  * their stays began. */
-static double normal_grown(const hapi_contact_kept *kept, const contact_stays *stays)
+static double normal_grown(const hapi_contact_kept *kept, const hapi_pair_stays *stays)
 {
   return hapi_v3_dot(kept->normal, stays->apart) + hapi_v3_dot(kept->turn_a, stays->a->moved + 3) +
          hapi_v3_dot(kept->turn_b, stays->b->moved + 3);
 }
 
 /* Whether both bodies stay, and are near enough to where they were against each other. */
-static bool kept_holds(const hapi_contact_kept *kept, const contact_stays *stays)
+static bool kept_holds(const hapi_contact_kept *kept, const hapi_pair_stays *stays)
 {
   double way[3];
-  bool slow = stays->a->slow && stays->b->slow;
-  double most2 = slow ? hapi_min(SLOW_WAY2, kept->way2) : kept->way2;
   hapi_v3_sub(stays->apart, kept->apart, way);
   return stays->a->number == kept->stay_a && stays->b->number == kept->stay_b &&
-         hapi_v3_dot(way, way) <= most2;
+         hapi_v3_dot(way, way) <= hapi_kept_way2(kept, stays);
 }
 
 /* m: how much wider the gap of kept rows has become. rows: looked at only where the contact slides
  * over a slope. */
 static double gap_grown(const hapi_contact_kept *kept, const hapi_row *rows,
-                        const contact_stays *stays)
+                        const hapi_pair_stays *stays)
 {
   double grown = normal_grown(kept, stays);
   for (int i = 0; kept->slides && i < 2; ++i) {
@@ -494,8 +473,8 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
                          uint32_t first, hapi_contact_kept *out)
 {
   const uint32_t approx = HAPI_SURFACE_APPROX1_1 | HAPI_SURFACE_APPROX1_2;
-  contact_stays stays;
-  stays_find(c->a, c->b, &stays);
+  hapi_pair_stays stays;
+  hapi_pair_stays_find(c->a, c->b, &stays);
   out->what = HAPI_KEPT_NOTHING;
   out->stay_a = stays.a->number;
   out->stay_b = stays.b->number;
@@ -533,21 +512,15 @@ static void contact_keep(const hapi_rows *rows, const placed_contact *c, uint8_t
   }
 }
 
-static double most_speed(const hapi_body_stay *stay, double reach)
+static bool still_apart(const hapi_contact_kept *kept, const hapi_pair_stays *stays, double period)
 {
-  return stay->speed + reach * stay->spin;
-}
-
-static bool still_apart(const hapi_contact_kept *kept, const contact_stays *stays, double period)
-{
-  double speed = most_speed(stays->a, kept->reach_a) + most_speed(stays->b, kept->reach_b);
   double gap = kept->gap + normal_grown(kept, stays);
-  return gap > OPEN_FLOOR + OPEN_TICKS * period * speed;
+  return gap > HAPI_OPEN_FLOOR + hapi_pair_closing(stays, kept->reach_a, kept->reach_b, period);
 }
 
 /* Whether the gap that is kept of a contact without rows is no wider than the one that it has. */
 static bool gap_is_no_wider(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
-                            uint32_t index, const contact_stays *stays)
+                            uint32_t index, const hapi_pair_stays *stays)
 {
   const hapi_contact_kept *kept = &contacts->memory[index].kept;
   placed_contact c;
@@ -690,6 +663,74 @@ static bool rows_go_on(hapi_rows *rows, placed_contact *c, hapi_contact_memory *
   return true;
 }
 
+/* ---- runs: see contact_run.h ---- */
+
+/* What a run stands for. */
+static bool run_is_of_such(const hapi_body_contacts *contacts, uint32_t index,
+                           const hapi_pair_stays *stays, const hapi_rows *rows,
+                           const hapi_tick_facts *facts)
+{
+  const hapi_contact_run *run = &contacts->runs[index];
+  uint32_t first = rows->solver.row_count;
+  for (uint32_t i = index; i < index + contacts->run_lengths[index]; ++i) {
+    const hapi_contact_kept *kept = &contacts->memory[i].kept;
+    double gap = kept->gap + normal_grown(kept, stays);
+    if (!kept_holds(kept, stays) || (i > index && contacts->run_lengths[i] > 0)) {
+      return false;
+    }
+    if (kept->what == HAPI_KEPT_APART) {
+      if (!still_apart(kept, stays, facts->period)) {
+        return false;
+      }
+      continue;
+    }
+    if (kept->what != HAPI_KEPT_ROWS || !kept->plain || kept->slides || kept->first != first ||
+        gap > 0.0 || gap < kept->least || !rows_stand(rows, kept, i) ||
+        !impulses_finite(&contacts->memory[i])) {
+      return false;
+    }
+    first += kept->count;
+  }
+  return first == rows->solver.row_count + run->rows;
+}
+
+static bool run_rows_stand(const hapi_contact_run *run, const hapi_local_body *a,
+                           const hapi_local_body *b, const hapi_rows *rows,
+                           const hapi_tick_facts *facts)
+{
+  const hapi_row_source *source = &rows->sources[run->first];
+  bool still = (a == NULL || hapi_body_is_still(a)) && (b == NULL || hapi_body_is_still(b));
+  return !still && !facts->bounces && rows->before.up == 0 &&
+         run->first == rows->solver.row_count && run->first >= rows->before.from &&
+         run->first + run->rows <= rows->before.end && source->contact == run->lead &&
+         !source->joint && !source->pointer;
+}
+
+/* How many contacts from there on need not be looked at. */
+static uint32_t run_goes_on(const hapi_body_contacts *contacts, const hapi_bodies *bodies,
+                            uint32_t index, hapi_rows *rows, const hapi_tick_facts *facts)
+{
+  const hapi_contact_run *run = &contacts->runs[index];
+  if (contacts->run_lengths[index] == 0) {
+    return 0;
+  }
+  const hapi_local_body *a = hapi_bodies_at(bodies, run->body_a);
+  const hapi_local_body *b = hapi_bodies_at(bodies, run->body_b);
+  hapi_pair_stays stays;
+  hapi_pair_stays_find(a, b, &stays);
+  if (!hapi_run_holds(run, &stays, facts->period) ||
+      (run->rows > 0 && !run_rows_stand(run, a, b, rows, facts))) {
+    return 0;
+  }
+  HAPI_ASSERT(run_is_of_such(contacts, index, &stays, rows, facts));
+  if (run->rows > 0) {
+    rows->solver.row_count += run->rows;
+    rows->kept += run->rows;
+    hapi_contact_stands(&rows->solver, run->by_mass);
+  }
+  return contacts->run_lengths[index];
+}
+
 /* False: the contact has to be placed. */
 static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bodies, uint32_t index,
                             hapi_rows *rows, const hapi_tick_facts *facts,
@@ -704,17 +745,22 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
   c.index = index;
   c.a = hapi_bodies_at(bodies, kept->body_a);
   c.b = hapi_bodies_at(bodies, kept->body_b);
-  contact_stays stays;
-  stays_find(c.a, c.b, &stays);
+  hapi_pair_stays stays;
+  hapi_pair_stays_find(c.a, c.b, &stays);
   if (!kept_holds(kept, &stays)) {
     return false;
   }
   if (kept->what == HAPI_KEPT_IDLE) {
+    hapi_run_close(contacts);
     return true;
   }
   if (kept->what == HAPI_KEPT_APART) {
     HAPI_ASSERT(gap_is_no_wider(contacts, bodies, index, &stays));
-    return still_apart(kept, &stays, facts->period);
+    if (!still_apart(kept, &stays, facts->period)) {
+      return false;
+    }
+    hapi_run_add(contacts, index, &stays, kept->gap + normal_grown(kept, &stays));
+    return true;
   }
   if (!rows_stand(rows, kept, index) || !impulses_finite(memory)) {
     return false;
@@ -727,9 +773,11 @@ static bool contact_goes_on(hapi_body_contacts *contacts, const hapi_bodies *bod
     rows->solver.row_count += kept->count;
     rows->kept += kept->count;
     hapi_contact_stands(&rows->solver, kept->by_mass);
-    return true;
+  } else if (!rows_go_on(rows, &c, memory, facts, sample)) {
+    return false;
   }
-  return rows_go_on(rows, &c, memory, facts, sample);
+  hapi_run_add(contacts, index, &stays, c.gap);
+  return true;
 }
 
 static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies, uint32_t index,
@@ -743,7 +791,7 @@ static void contact_make(hapi_body_contacts *contacts, const hapi_bodies *bodies
   if (!find_contact(contacts, bodies, index, &c)) {
     contact_keep(rows, &c, HAPI_KEPT_IDLE, first, &memory->kept);
   } else if (first + HAPI_CONTACT_ROWS <= rows->capacity && contact_place(&c)) {
-    bool near = is_near(&c, had ? LEAVE_FLOOR : OPEN_FLOOR, facts->period);
+    bool near = is_near(&c, had ? LEAVE_FLOOR : HAPI_OPEN_FLOOR, facts->period);
     if (near) {
       rows_make_room(contacts, index, rows);
       add_contact(rows, &c, memory, facts, sample);
@@ -765,15 +813,15 @@ bool hapi_contact_is_near(const hapi_body_contacts *contacts, const hapi_bodies 
   if (kept->what != HAPI_KEPT_NOTHING) {
     const hapi_local_body *a = hapi_bodies_at(bodies, kept->body_a);
     const hapi_local_body *b = hapi_bodies_at(bodies, kept->body_b);
-    contact_stays stays;
-    stays_find(a, b, &stays);
+    hapi_pair_stays stays;
+    hapi_pair_stays_find(a, b, &stays);
     if (kept_holds(kept, &stays) && (kept->what == HAPI_KEPT_IDLE || kept->what == HAPI_KEPT_ROWS ||
                                      still_apart(kept, &stays, facts->period))) {
       return kept->what == HAPI_KEPT_ROWS;
     }
   }
   return find_contact(contacts, bodies, index, &c) && contact_place(&c) &&
-         is_near(&c, OPEN_FLOOR, facts->period);
+         is_near(&c, HAPI_OPEN_FLOOR, facts->period);
 }
 
 /* Those of islands that are still have no rows. */
@@ -805,12 +853,22 @@ void hapi_contact_rows(hapi_body_contacts *contacts, const hapi_bodies *bodies, 
     return;
   }
   contacts->still_active = 0;
+  hapi_run_close(contacts);
   for (uint32_t i = 0; i < contacts->patches->contact_count; ++i) {
     if (bodies->still > 0 && contact_rests(contacts, bodies, i)) {
+      hapi_run_close(contacts);
       continue;
     }
+    uint32_t standing = goes_on ? run_goes_on(contacts, bodies, i, rows, facts) : 0;
+    if (standing > 0) {
+      hapi_run_close(contacts);
+      i += standing - 1;
+      continue;
+    }
+    contacts->run_lengths[i] = 0;
     if (!goes_on || !contact_goes_on(contacts, bodies, i, rows, facts, sample)) {
       contact_make(contacts, bodies, i, rows, facts, sample);
+      hapi_run_close(contacts);
     }
   }
 }

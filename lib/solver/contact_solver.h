@@ -141,7 +141,7 @@ void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count);
 
 /* The same of a triple of which the targets are those of that run as well, and which moves both
  * bodies or is single: nothing of its rows is looked at. */
-static inline void hapi_contact_stands(hapi_solver *solver, bool by_mass)
+static inline void hapi_contact_stands(hapi_solver *solver, uint32_t by_mass)
 {
   solver->packs.known.ready += by_mass;
   solver->owes = true;

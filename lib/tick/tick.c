@@ -12,6 +12,7 @@
 #include "guard/lateness.h"
 #include "guard/oscillation.h"
 #include "guard/promise.h"
+#include "local/contact_run.h"
 #include "local/grab_place.h"
 #include "local/grab_rows.h"
 #include "paper/local_dynamics.h"
@@ -55,6 +56,8 @@ void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS])
       ARRAY(touches.old_feels, c->feels),
       ARRAY(contacts.memory, c->contacts),
       ARRAY(contacts.old_memory, c->contacts),
+      ARRAY(contacts.runs, c->contacts),
+      ARRAY(contacts.run_lengths, c->contacts),
       ARRAY(contacts.buckets, tick->contacts.bucket_count),
       ARRAY(joints.of, c->joints),
       ARRAY(joints.memory, c->joints),

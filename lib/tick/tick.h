@@ -71,7 +71,7 @@ typedef struct hapi_tick_array {
   bool stays;  /* hapi_tick_reset does not touch it */
 } hapi_tick_array;
 
-#define HAPI_TICK_ARRAYS 46
+#define HAPI_TICK_ARRAYS 48
 
 /* All of them; the capacity, and that of rows, buckets and work, are set. */
 void hapi_tick_arrays(hapi_tick *tick, hapi_tick_array out[HAPI_TICK_ARRAYS]);
