@@ -6,6 +6,9 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <time.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <ode/ode.h>
 
@@ -68,6 +71,13 @@ void tap_skip(const char *format, ...)
   va_start(list, format);
   vsnprintf(tap_reason, sizeof tap_reason, format, list);
   va_end(list);
+}
+
+void tap_fresh_memory(void)
+{
+#ifdef __GLIBC__
+  (void)mallopt(M_MMAP_THRESHOLD, 1 << 14);
+#endif
 }
 
 bool tap_skip_all(const char *reason)

@@ -70,6 +70,9 @@ void tap_say(const char *format, ...) HAP_PRINTF(1, 2);
 void tap_skip(const char *format, ...) HAP_PRINTF(1, 2);
 /* Leaves the running test; what it owns is finished. */
 _Noreturn void tap_leave(void);
+/* From now on large blocks come from the system, never touched, not from what was freed: for tests
+ * that count the pages a thread touches first. */
+void tap_fresh_memory(void);
 /* Both return false. */
 bool tap_skip_all(const char *reason);
 bool tap_bail_out(const char *reason);

@@ -550,6 +550,7 @@ static void *ticks_run(void *user)
 TEST(a_million_ticks_wait_for_nothing)
 {
   pthread_t thread;
+  tap_fresh_memory();
   service *s = service_new(NULL);
   device_rig *r = rig_new(service_spec(s, SLOW));
   ticks t = {.r = r};

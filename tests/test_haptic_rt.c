@@ -824,6 +824,7 @@ TEST(ten_thousand_cycles_touch_no_new_memory)
   hap_detail detail;
   struct rusage before;
   struct rusage after;
+  tap_fresh_memory();
   set_up();
   hapi_haptic_config config = {.capacity = capacity,
                                .haptic_hz = 1000.0,

@@ -624,6 +624,7 @@ TEST(a_million_ticks_wait_for_nothing)
 {
   for (int v = 0; v < 2; ++v) {
     pthread_t thread;
+    tap_fresh_memory();
     (void)vendor_standin(both[v], 0.0);
     device_rig *r = rig_new(vendor_spec(both[v], SLOW));
     ticks t = {.r = r};

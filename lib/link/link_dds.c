@@ -170,8 +170,8 @@ static hap_status dds_open(const hap_link_dds_def *given, uint32_t serves, hap_l
   hap_link_dds_def def;
   const hap_link_dds_module *module = NULL;
   void *self = NULL;
-  hap_detail none;
-  hap_detail *why = detail != NULL ? detail : &none;
+  hap_detail unread = {""};
+  hap_detail *why = detail != NULL ? detail : &unread;
   if (out == NULL) {
     return hapi_fail(why, HAP_ERROR_ARGUMENT, "a link over DDS: out is NULL");
   }

@@ -21,6 +21,7 @@ OPTIONS = [
 
 
 def main(root, whole):
+    os.nice(19)
     if not shutil.which("cppcheck"):
         lint.skip_all("needs cppcheck")
     tap = lint.Tap()
