@@ -706,3 +706,24 @@ TEST(contacts_that_are_passed_over_would_have_stayed_to_the_last_bit)
   CHECK(with_run > TICKS / 4 && with_run < TICKS - 200);
   CHECK(most > 1e-3);
 }
+
+/* The body stops where it is. */
+TEST(impulses_that_are_no_numbers_end_with_the_tick_that_had_them)
+{
+  static const double pushes[] = {NAN, INFINITY, -INFINITY};
+  for (int k = 0; k < 3; ++k) {
+    box_rest();
+    f.bodies[0].pose.position[2] -= 5e-7;
+    f.bodies[0].forced = true;
+    ticks_run(100);
+    REQUIRE(f.tick.contacts.run_lengths[0] == 4);
+    f.bodies[0].given.user_wrench[2] = pushes[k];
+    ticks_run(1);
+    f.bodies[0].given.user_wrench[2] = 0.0;
+    ticks_run(100);
+    for (int i = 0; i < 4; ++i) {
+      CHECK(isfinite(f.tick.contacts.memory[i].impulse[0]));
+    }
+    CHECK_NEAR(load_on_floor(), 9.81 * MASS, 1e-6);
+  }
+}

@@ -60,9 +60,10 @@ typedef struct hapi_contact_memory {
   double held[3]; /* N s, on the first body in a tick, while it is still: see body_still.h */
 } hapi_contact_memory;
 
-typedef struct hapi_contact_run hapi_contact_run; /* see contact_run.h */
+/* Contacts that a tick passes over as one, see contact_run.h. */
+typedef struct hapi_contact_run hapi_contact_run;
 
-#define HAPI_RUN_MOST 16u /* contacts */
+#define HAPI_RUN_MOST 16u /* contacts of a run */
 
 typedef struct hapi_body_contacts {
   hapi_patches *patches;           /* NULL: none yet */
@@ -72,7 +73,7 @@ typedef struct hapi_body_contacts {
   uint8_t *run_lengths;            /* contacts of each; 0: none begins there */
   uint64_t contents;               /* of the patches */
   uint32_t memory_count;
-  uint32_t run;          /* the one that is being made; HAPI_SLOT_NONE */
+  uint32_t run;          /* the one that is being made, by its first contact; HAPI_SLOT_NONE */
   uint32_t *buckets;     /* of the matching; bucket_count */
   uint32_t bucket_count; /* power of 2 */
   uint32_t buckets_used; /* likewise; scratch of the matching */

@@ -7,7 +7,7 @@
 
 #include "base/assert.h"
 
-/* The bounds below are rounded, and so are the gaps. */
+/* Less than the exact bounds, as these and the gaps are rounded. */
 #define SLACK (1.0 - 1e-6)
 #define SLACK_WAY 1e-14 /* m */
 
@@ -36,7 +36,6 @@ static void run_begin(hapi_contact_run *run, const hapi_contact_kept *kept,
   hapi_v3_copy(kept->turn_b, run->turn_b);
 }
 
-/* What a contact with rows allows. */
 static void run_add_rows(hapi_contact_run *run, uint32_t index, const hapi_contact_kept *kept,
                          double gap)
 {
@@ -95,8 +94,9 @@ void hapi_run_add(hapi_body_contacts *contacts, uint32_t index, const hapi_pair_
   }
 }
 
-/* m: no gap has changed by more since the run was made. Another point of the pair than the first
- * one goes another way by what the bodies turn against each other. */
+/* m: upper bound of the change of any gap since the run was made. With way w and turns A and B of
+ * the bodies a gap changes by n.w + turn_a.A + turn_b.B, to first order. That of the first contact
+ * is exact; another one differs by d_a.A + d_b.B = d_a.(A - B) + (d_a + d_b).B. */
 static double run_change(const hapi_contact_run *run, const hapi_pair_stays *stays,
                          const double way[3])
 {

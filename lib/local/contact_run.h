@@ -3,9 +3,10 @@
 #ifndef HAPODE_LOCAL_CONTACT_RUN_H
 #define HAPODE_LOCAL_CONTACT_RUN_H
 
-/* Kept contacts of a pair that follow each other and share a normal, of which all stay: their rows
- * stand one behind the other and ask for what they asked for, or they are too far open for rows.
- * While the bodies have gone less since than each of them allows, none of them is looked at. */
+/* A run: neighbours in the list of contacts, of the same two bodies, with the same normal and kept
+ * from the tick before. Each either has rows that need no change, or is too far open for rows. A
+ * run knows the smallest motion of the bodies that changes this for any of its contacts. Until then
+ * the tick looks at the run alone. */
 
 #include "local/body_stay.h"
 #include "local/contact_memory.h"
@@ -22,20 +23,21 @@ struct hapi_contact_run {
   uint32_t lead;  /* the first contact with rows */
   uint32_t first; /* where they stand */
   uint16_t rows;
-  uint16_t by_mass; /* contacts, see hapi_contact_stands */
-  bool slow;        /* both bodies were, when it was made */
-  double margin;    /* m: by which the gaps of those with rows may change, HUGE_VAL: none; */
-  double way2;      /* m^2: how far the bodies may go against each other; */
-  double open; /* m: how near those without rows may come, see HAPI_OPEN_FLOOR; HUGE_VAL: none */
-  double apart[3];   /* of hapi_pair_stays, when it was made; */
-  double angle_a[3]; /* likewise rad, of the stays' moved + 3 */
+  uint16_t by_mass;  /* contacts, see hapi_contact_stands */
+  bool slow;         /* both bodies were slow when the run was made */
+  double margin;     /* m: gaps of contacts with rows may change by so much; HUGE_VAL: no rows */
+  double way2;       /* m^2: square of the way that the bodies may go against each other */
+  double open;       /* m: contacts without rows may close by so much; HUGE_VAL: all have rows */
+  double apart[3];   /* m: hapi_pair_stays.apart when the run was made */
+  double angle_a[3]; /* rad: turn of a since its stay began, when the run was made */
   double angle_b[3];
   double normal[3];
   double turn_a[3]; /* of the first contact, see hapi_contact_kept */
   double turn_b[3];
-  double radius2; /* m^2: most of another one's turn_a - turn_a, */
-  double skew2;   /* m^2: of the sum of that and of the same of b; 0 but for when they were made */
-  double reach_a; /* m, of those without rows */
+  double
+      radius2;  /* m^2: largest |d_a|^2, with d_a = turn_a of another contact - turn_a; d_b alike */
+  double skew2; /* m^2: largest |d_a + d_b|^2. Contacts that were made at once have d_b = -d_a */
+  double reach_a; /* m: largest of contacts without rows, see hapi_contact_kept */
   double reach_b;
 };
 
@@ -54,8 +56,7 @@ static inline void hapi_pair_stays_find(const hapi_local_body *a, const hapi_loc
   hapi_v3_sub(out->a->moved, out->b->moved, out->apart);
 }
 
-/* m: of points as far from the centres of the bodies, how much nearer they may come in
- * HAPI_OPEN_TICKS. */
+/* m: what a gap may close in HAPI_OPEN_TICKS. reach: of its point from the bodies' centres. */
 static inline double hapi_pair_closing(const hapi_pair_stays *stays, double reach_a, double reach_b,
                                        double period)
 {
@@ -71,17 +72,19 @@ static inline double hapi_kept_way2(const hapi_contact_kept *kept, const hapi_pa
   return stays->a->slow && stays->b->slow ? hapi_min(slow2, kept->way2) : kept->way2;
 }
 
-/* A kept contact that was just looked at, with its gap of now [m]. Contacts come in their order. */
+/* Adds a kept contact that was just looked at, in the order of the contacts, with its gap [m] in
+ * this tick. */
 void hapi_run_add(hapi_body_contacts *contacts, uint32_t index, const hapi_pair_stays *stays,
                   double gap);
 
-/* The next contact belongs to none of those that came so far. */
+/* The next contact does not join the run that is being made. */
 static inline void hapi_run_close(hapi_body_contacts *contacts)
 {
   contacts->run = HAPI_SLOT_NONE;
 }
 
-/* Whether no contact of it can have gone beyond what it allows. Not whether its rows stand. */
+/* Whether the motion of the bodies is small enough for all contacts. The caller knows whether the
+ * rows are still in their places. */
 bool hapi_run_holds(const hapi_contact_run *run, const hapi_pair_stays *stays, double period);
 
 #endif

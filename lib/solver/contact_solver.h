@@ -139,8 +139,9 @@ void hapi_contact_ready(hapi_solver *solver, uint32_t first, uint32_t count, boo
  * hapi_packs_begin. */
 void hapi_contact_again(hapi_solver *solver, uint32_t first, uint32_t count);
 
-/* The same of a triple of which the targets are those of that run as well, and which moves both
- * bodies or is single: nothing of its rows is looked at. */
+/* The same of triples of which the targets are those of that run as well, and which move both
+ * bodies or are single: nothing of their rows is looked at. by_mass: how many are, see
+ * hapi_contact_ready. */
 static inline void hapi_contact_stands(hapi_solver *solver, uint32_t by_mass)
 {
   solver->packs.known.ready += by_mass;
